@@ -24,6 +24,7 @@ def modes(
     up_to: float | None = None,
     count: int | None = None,
     edge: float | None = None,
+    up_axis: str | None = None,
 ) -> "FileModes":
     """The free vibration of an object.
 
@@ -34,6 +35,7 @@ def modes(
         up_to: Hz, that every mode lies below; None for what a person hears, or for ``count``.
         count: how many of the lowest.
         edge: m, longest edge of an element; by the wave if None, which is finer and dearer.
+        up_axis: axis of the file that points up, "x", "y" or "z"; None for the one that it declares, else z.
 
     Returns:
         ``solution.modes.frequencies`` in Hz, whether it is certain that none is missing
@@ -48,7 +50,16 @@ def modes(
     from harness.sim.modal.file import modes_of_file
 
     store = Store(default_folder())
-    return modes_of_file(str(mesh), named(material), units, limit=up_to, count=count, edge=edge, store=store)
+    return modes_of_file(
+        str(mesh),
+        named(material),
+        units,
+        limit=up_to,
+        count=count,
+        edge=edge,
+        store=store,
+        up_axis=up_axis,
+    )
 
 
 def tactile_image(
@@ -59,6 +70,7 @@ def tactile_image(
     units: str | None = None,
     sensor: str | None = None,
     calibration: str | None = None,
+    up_axis: str | None = None,
 ) -> "Press":
     """What a tactile camera sees of a press.
 
@@ -70,6 +82,7 @@ def tactile_image(
         units: of the file's numbers.
         sensor: a make, or the path of a sensor's own file; ``"gelsight-r1.5"`` if None.
         calibration: of its colours; the make's own if None.
+        up_axis: axis of the file that points up; None for the one that it declares, else z.
 
     Returns:
         ``image`` ``(rows, columns, 3)`` RGB, ``surface`` of the gel in m, ``evaluation.seconds`` by effect.
@@ -86,7 +99,7 @@ def tactile_image(
     from harness.sim.optics.known_gel import known_gel
 
     material = None if str(mesh).startswith(BUILTIN) else "steel"  # touch does not depend on it
-    scene = scene_from_options(str(mesh), material, units)
+    scene = scene_from_options(str(mesh), material, units, up_axis=up_axis)
     gel, known = known_gel(sensor, calibration), known_object(scene)
     place = contact_place(known.mesh, np.asarray(contact, dtype=np.float64))
     pose = gel_from_object(place, depth, tilt, 0.0, 0.0, gel.sensor.gel_thickness)

@@ -30,6 +30,7 @@ class PartRequest:
         wall: m, of a hollow thing of which the file has the outside; a picture is of the file's faces.
         licence: of the mesh, and so of the ObjectFile.
         seed: of everything random.
+        up_axis: axis of the file that points up; None for the one that it declares, else z.
     """
 
     mesh: str
@@ -39,6 +40,7 @@ class PartRequest:
     wall: float | None = None
     licence: str = "unknown"
     seed: int = 0
+    up_axis: str | None = None
 
 
 def provenance_of(

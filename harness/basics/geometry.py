@@ -7,6 +7,25 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray
 
+UPRIGHT = {
+    "z": np.eye(3),
+    "-z": np.diag([1.0, -1.0, -1.0]),
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    "-y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+    "x": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
+    "-x": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]),
+}
+"""``(3, 3)`` rotations that turn a named axis to +z."""
+
+
+def rotate_upright(points: FloatArray, axis: str) -> FloatArray:
+    """Rotate ``(n, 3)`` points about the origin so that ``axis``, a key of ``UPRIGHT``, becomes z."""
+    if axis == "z":
+        return points
+    # Infinite coordinates become NaN, and are refused as these are.
+    with np.errstate(invalid="ignore"):
+        return np.asarray(points @ UPRIGHT[axis].T)
+
 
 def transform(rotation: FloatArray, translation: FloatArray) -> FloatArray:
     """The 4x4 transform of a ``(3, 3)`` rotation followed by a ``(3,)`` translation in metres."""

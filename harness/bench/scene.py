@@ -11,7 +11,7 @@ from pydantic import Field, create_model, field_validator, model_validator
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import WrongUse
 from harness.basics.files.named_file import nearest, real_path
-from harness.basics.geometry import rotation_about, transform, translation
+from harness.basics.geometry import UPRIGHT, rotation_about, transform, translation
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.basics.quantities import (
@@ -37,8 +37,6 @@ from harness.bench.scene_objectfile import (
 from harness.objects.builtin import BUILTIN
 from harness.objects.builtin import MATERIALS as BUILTIN_MATERIALS
 
-UNITS = ("m", "cm", "mm", "in")
-
 _REACHED = (0.05, 0.45)
 """M: objects that an arm at this bench can reach around."""
 
@@ -46,14 +44,6 @@ _SIZES = (1e-3, 10.0)
 """Longest sides that may be requested, in m; the squares and cubes of smaller and larger ones lose digits."""
 
 _Z = np.array([0.0, 0.0, 1.0])
-_UPRIGHT = {
-    "z": np.eye(3),
-    "-z": np.diag([1.0, -1.0, -1.0]),
-    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
-    "-y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
-    "x": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
-    "-x": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]),
-}
 
 
 class Pose(StrictModel):
@@ -62,7 +52,8 @@ class Pose(StrictModel):
     Attributes:
         position: m, of the anchor.
         yaw: rad, about the vertical.
-        up: the axis of the mesh file that points up.
+        up: axis of the object's frame that points up. In that frame z is up already where the mesh file
+            declares its up axis, or where ``up_axis`` of the object states it.
         anchor: the point meant by ``position``: the middle of the upright object's bottom (of
             its bounding box), or the mesh file's origin.
     """
@@ -80,6 +71,8 @@ class SceneObject(StrictModel):
         mesh: ``"builtin:mug"`` and so on, or a mesh file; relative to the scene file in the file,
             absolute once it is read. Left out where the object is that of an ObjectFile, which has its own.
         units: of the mesh file's numbers; None to go by the file and its size.
+        up_axis: axis of the mesh file that points up: the file is rotated about its origin until that is z,
+            which gives the object's frame; None for the axis that the file declares (glTF, COLLADA), else z.
         material: a key of ``harness.basics.materials.MATERIALS``; a built-in object has one of its own.
         scale: applied to the mesh after its units; ``"hidden"`` where nobody is told how large the object was
             made: models keep the drawing's size, and a mocked world draws another from the run's seed.
@@ -93,7 +86,8 @@ class SceneObject(StrictModel):
     """
 
     mesh: str = Field(min_length=1)
-    units: Literal["m", "cm", "mm", "in"] | None = None
+    units: Literal["m", "cm", "mm", "um", "in", "ft"] | None = None
+    up_axis: Literal["x", "y", "z"] | None = None
     material: str
     scale: float | Literal["hidden"] = 1.0
     sizes: Annotated[tuple[Annotated[Length, Positive], Length], Ordered] | None = None
@@ -156,6 +150,12 @@ class SceneObject(StrictModel):
                 "and a larger size within that"
             )
         return sizes
+
+    @model_validator(mode="after")
+    def _only_files_have_an_up_axis(self) -> "SceneObject":
+        if self.up_axis is not None and (self.builtin is not None or self.is_objectfile):
+            raise ValueError("up_axis is of a mesh file, and this object has z up; leave it out")
+        return self
 
     @model_validator(mode="after")
     def _sizes_are_of_a_hidden_one(self) -> "SceneObject":
@@ -308,7 +308,7 @@ class SceneFile(StrictModel):
     def base_from_object(self, mesh: Mesh) -> FloatArray:
         """``(4, 4)``, nominal, of the object whose mesh in metres is given."""
         pose = self.object.pose
-        upright = _UPRIGHT[pose.up]
+        upright = UPRIGHT[pose.up]
         anchor = np.zeros(3)
         if pose.anchor == "bottom":
             corners = mesh.vertices[np.unique(mesh.faces)] @ upright.T
@@ -338,6 +338,7 @@ def scene_from_options(
     units: str | None = None,
     wall: str | None = None,
     objectfile: str | None = None,
+    up_axis: str | None = None,
 ) -> SceneFile:
     """The scene that ``run --object FILE --material M --units mm --wall 2mm`` means.
 
@@ -348,11 +349,19 @@ def scene_from_options(
         units: of the file's numbers.
         wall: a length with its unit.
         objectfile: folder, relative to the working directory, or such a name.
+        up_axis: axis of the file that points up: "x", "y" or "z".
 
     Raises:
         WrongUse: an option that cannot be, or no such file.
     """
-    given = {"mesh": mesh, "material": material, "units": units, "wall": wall, "objectfile": objectfile}
+    given = {
+        "mesh": mesh,
+        "material": material,
+        "units": units,
+        "wall": wall,
+        "objectfile": objectfile,
+        "up_axis": up_axis,
+    }
     if holds_objectfile(objectfile_folder(mesh, Path.cwd())):
         _require_one(mesh, objectfile)
         given |= {"mesh": None, "objectfile": mesh}

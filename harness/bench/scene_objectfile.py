@@ -17,7 +17,7 @@ from harness.objects.builtin import BUILTIN, DESCRIPTION, MATERIALS
 OBJECTFILE = "objectfile:"
 """In place of a mesh file: the object is that of the folder beside it, whose name follows."""
 
-_OF_A_MESH = ("material", "units", "wall")
+_OF_A_MESH = ("material", "units", "wall", "up_axis")
 
 
 def holds_objectfile(folder: Path) -> bool:

@@ -14,6 +14,7 @@ def mock_lab(
     object_: options.Object = None,
     material: options.Material = None,
     units: options.Units = None,
+    up_axis: options.UpAxis = None,
     seed: options.Seed = None,
     gap: options.GapOption = None,
     json: options.Json = False,
@@ -32,7 +33,7 @@ def mock_lab(
     from harness.effects.scene_object import known_object
 
     default = "builtin:mug" if scene is None and object_ is None else object_
-    wanted = resolve(SceneOptions(scene, default, material, units))
+    wanted = resolve(SceneOptions(scene, default, material, units, up_axis=up_axis))
     bench = load_station(station_path(station))
     gap_file = gap_path(gap or (bench.mock.gap if bench.mock is not None else "default"))
     with TemporaryDirectory(prefix="touchstone-truth-") as folder:

@@ -151,6 +151,15 @@ Units = Annotated[
         "--units", help="Of the mesh file's numbers: m, cm, mm, um, in or ft (with --object).", metavar="U"
     ),
 ]
+UpAxis = Annotated[
+    str | None,
+    typer.Option(
+        "--up-axis",
+        help="Axis of the mesh file that points up: x, y or z; the file is rotated until that is z. By the "
+        "file if left out (glTF: y; COLLADA: its up_axis), else z.",
+        metavar="AXIS",
+    ),
+]
 Wall = Annotated[
     str | None,
     typer.Option("--wall", help="Wall of a hollow thing scanned as a solid, as 2mm.", metavar="LENGTH"),

@@ -18,7 +18,7 @@ class SceneOptions:
     Attributes:
         scene: a file.
         object: a mesh, a built-in object or an ObjectFile instead.
-        material, units, wall, objectfile: of that object.
+        material, units, wall, objectfile, up_axis: of that object.
         sense: ``"both"``, or senses with commas between.
         sizes: between which the longest side of an object of unknown size is.
         keys: of the experiment's table.
@@ -35,11 +35,12 @@ class SceneOptions:
     sizes: tuple[str, str] | None = None
     keys: Mapping[str, Any] = field(default_factory=dict)
     assignments: Sequence[str] = ()
+    up_axis: str | None = None
 
     @property
     def of_object(self) -> tuple[str | None, ...]:
         """What belongs to ``object`` alone."""
-        return self.material, self.units, self.wall, self.objectfile
+        return self.material, self.units, self.wall, self.objectfile, self.up_axis
 
 
 def resolve(
@@ -78,7 +79,8 @@ def _chosen(options: SceneOptions, assumed: Mapping[str, Mapping[str, Any]]) -> 
         return _with(scene_from_options(options.object, *options.of_object), assumed)
     if any(option is not None for option in options.of_object):
         raise WrongUse(
-            "--material, --units, --wall and --objectfile belong to --object; a scene file says its own"
+            "--material, --units, --wall, --objectfile and --up-axis belong to --object; a scene file states "
+            "its own"
         )
     assert options.scene is not None
     return load_scene(options.scene)

@@ -84,5 +84,11 @@ def known_object(scene: SceneFile) -> KnownObject:
     if wanted.is_objectfile:
         mesh = named_file(scene).mesh
         return KnownObject(Mesh(mesh.vertices * wanted.drawn_scale, mesh.faces), None)
-    taken = take_in(Path(wanted.mesh), wanted.units, wanted.drawn_scale, wanted.wall)
+    path = Path(wanted.mesh)
+    taken = take_in(path, wanted.units, wanted.drawn_scale, wanted.wall, wanted.up_axis)
+    if taken.report.up_axis and wanted.up_axis != "z" and wanted.pose.up != "z":
+        raise WrongUse(
+            f"{path.name}: {taken.report.up_axis}, and the pose has up = {wanted.pose.up!r} on top of that; "
+            'leave up out of [object.pose], or say up_axis = "z" in [object] to keep the file\'s axes'
+        )
     return KnownObject(taken.mesh, taken.report)

@@ -152,12 +152,13 @@ def _modes(
     whole: dict[str, float] = {}
     with timed(whole, "intake"):
         source = source_of(wanted.mesh, wanted.licence)
-        volume = source.sha256 is not None and read_volume(Path(wanted.mesh), wanted.units) is not None
+        is_file = source.sha256 is not None
+        volume = is_file and read_volume(Path(wanted.mesh), wanted.units, wanted.up_axis) is not None
     if volume:
         mesh, modes, said = _of_volume(wanted, begin)
     else:
         with timed(whole, "intake"):
-            taken = surface_of(wanted.mesh, wanted.units, wanted.wall)
+            taken = surface_of(wanted.mesh, wanted.units, wanted.wall, wanted.up_axis)
         modes, kept = _solved(wanted, taken.mesh, store, begin)
         mesh, said = taken.mesh, (*taken.said, *((_KEPT,) if kept else ()))
     none = dict.fromkeys([before + stage for before in ("", CPU) for stage in _SOLVED.values()], 0.0)
@@ -168,7 +169,14 @@ def _modes(
 def _of_volume(wanted: AudioRequest, begin: Begin) -> tuple[Mesh, Modes, tuple[str, ...]]:
     path = Path(wanted.mesh)
     solved = modes_of_file(
-        path, wanted.material, wanted.units, wanted.wall, wanted.limit, edge=wanted.edge, begin=begin
+        path,
+        wanted.material,
+        wanted.units,
+        wanted.wall,
+        wanted.limit,
+        edge=wanted.edge,
+        begin=begin,
+        up_axis=wanted.up_axis,
     )
     modes = solved.solution.modes
     return Mesh(modes.points, modes.faces), modes, solved.said

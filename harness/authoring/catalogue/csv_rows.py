@@ -12,7 +12,7 @@ from harness.basics.files.text_file import read_text
 PUBLISHED = ("number", "name", "scale_m", "material", "source")
 """Columns of ObjectFolder's ``objects.csv``, which has no header."""
 
-COLUMNS = (*PUBLISHED, "mesh", "units", "wall_m", "mass_kg", "licence")
+COLUMNS = (*PUBLISHED, "mesh", "units", "wall_m", "mass_kg", "licence", "up_axis")
 """Columns that the header of a CSV file may name."""
 
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "vertical bars"}

@@ -122,8 +122,8 @@ def _taken(row: CatalogueRow, mesh: str) -> tuple[Mesh, str, bool, tuple[str, ..
     """Surface of the material, units, whether the file's surface was closed, and intake's own warnings."""
     units = units_of(row, mesh)
     if mesh.startswith(BUILTIN):
-        return surface_of(mesh, units, row.wall).mesh, "m", True, ()
-    intake = take_in(Path(mesh), units, wall=row.wall)
+        return surface_of(mesh, units, row.wall, row.up_axis).mesh, "m", True, ()
+    intake = take_in(Path(mesh), units, wall=row.wall, up_axis=row.up_axis)
     report = intake.report
     return walled(intake.mesh, row.wall), report.units, report.watertight, report.warnings
 

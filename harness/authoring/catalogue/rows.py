@@ -35,6 +35,7 @@ class CatalogueRow:
         mass: kg, of the real object; None where nobody weighed it.
         licence: of the mesh.
         source: where the mesh comes from; None where the catalogue does not say.
+        up_axis: axis of the file that points up; None for the one that it declares, else z.
     """
 
     name: str
@@ -47,6 +48,7 @@ class CatalogueRow:
     mass: float | None = None
     licence: str = "unknown"
     source: str | None = None
+    up_axis: str | None = None
 
 
 @dataclass(frozen=True)
@@ -152,6 +154,7 @@ def _row(cells: dict[str, str]) -> CatalogueRow:
         mass=_positive(given, "mass_kg", "kg"),
         licence=given.get("licence", "unknown"),
         source=given.get("source"),
+        up_axis=given.get("up_axis"),
     )
 
 

@@ -97,7 +97,8 @@ def build_item(row: CatalogueRow, mesh: str, spec: BuildSpec) -> BuildItem:
     Raises:
         WrongUse: there is no such file.
     """
-    shape = [_surface_key(mesh), row.units, row.wall, row.scale if row.units is None else None, row.licence]
+    label = row.scale if row.units is None else None
+    shape = [_surface_key(mesh), row.units, row.wall, label, row.licence, row.up_axis]
     common = [*shape, spec.profile, spec.seed]
     of_sense: dict[Modality, list[Any]] = {
         "audio": [MATERIALS[row.material], spec.limit, spec.most, spec.edge],

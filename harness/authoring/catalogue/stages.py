@@ -139,6 +139,7 @@ def _request(item: BuildItem, spec: BuildSpec) -> PartRequest:
         wall=row.wall,
         licence=row.licence,
         seed=spec.seed,
+        up_axis=row.up_axis,
     )
 
 

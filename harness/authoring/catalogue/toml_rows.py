@@ -23,6 +23,7 @@ class ObjectTable(StrictModel):
         mass: of the real object.
         licence: of the mesh.
         source: where the mesh comes from.
+        up_axis: axis of the file that points up: x, y or z.
     """
 
     name: str
@@ -35,6 +36,7 @@ class ObjectTable(StrictModel):
     mass: Annotated[Annotated[float, MASS], Positive] | None = None
     licence: str = "unknown"
     source: str | None = None
+    up_axis: str | None = None
 
 
 class CatalogueFile(StrictModel):

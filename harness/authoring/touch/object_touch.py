@@ -64,7 +64,7 @@ def build_touch(wanted: TouchRequest, out: Path, report: Report, threads: int = 
     begun = time.perf_counter()
     report("reading the mesh", 0.0)
     source = source_of(wanted.mesh, wanted.licence)
-    surface = surface_of(wanted.mesh, wanted.units, wanted.wall)
+    surface = surface_of(wanted.mesh, wanted.units, wanted.wall, wanted.up_axis)
     mesh, taken = surface.mesh, time.perf_counter() - begun
     created = created_object(wanted.mesh, wanted.licence, wanted.material, mesh, out, source)
     skirt = skirt_for(wanted.sensor)

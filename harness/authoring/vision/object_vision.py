@@ -67,8 +67,8 @@ def build_vision(
     begun = time.perf_counter()
     report("reading the mesh and its colours", 0.0)
     source = source_of(wanted.mesh, wanted.licence)
-    taken = surface_of(wanted.mesh, wanted.units, wanted.wall)
-    look = appearance_of(wanted.mesh, taken.units, edge=chosen.edge)
+    taken = surface_of(wanted.mesh, wanted.units, wanted.wall, wanted.up_axis)
+    look = appearance_of(wanted.mesh, taken.units, edge=chosen.edge, up_axis=wanted.up_axis)
     created = created_object(wanted.mesh, wanted.licence, wanted.material, taken.mesh, out, source)
     read = time.perf_counter() - begun
     vision = author_vision(look, chosen, wanted.seed, out, report, threads)

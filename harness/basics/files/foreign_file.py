@@ -16,6 +16,12 @@ MOST_JSON = 2**26
 MOST_DATA = 2**29
 """Bytes of a picture, of an array, or of all that an archive unpacks to."""
 
+_MOST_LISTED = 2**23
+"""Bytes of the list of an archive's members: some 100,000 of them."""
+
+_ZIP_TAIL = 2**16 + 22 + 20
+"""Bytes at the end of an archive that hold where its list is."""
+
 
 def require_readable(path: Path, what: str, most: int, refused: type[TouchstoneError] = DataRefused) -> None:
     """Refuse what is no file, or a longer one than any of its kind, before it is read.
@@ -59,10 +65,19 @@ def unreadable(path: Path, error: OSError) -> WrongUse:
 
 
 def require_unpackable(path: Path, what: str, refused: type[TouchstoneError] = DataRefused) -> None:
-    """Refuse a ZIP archive that unpacks to more than ``MOST_DATA``, before it is unpacked.
+    """Refuse a ZIP archive whose members together unpack to more than ``MOST_DATA``, before it is unpacked.
 
-    The sizes that it states are those that the library unpacks to: it reads no byte more.
+    The sizes that it states are those that the library unpacks to: it reads no byte more. The list of members
+    is bounded before it is read, since the library holds all of it in memory.
     """
+    require_readable(path, what, MOST_DATA, refused)
+    with path.open("rb") as stream:
+        stream.seek(max(0, path.stat().st_size - _ZIP_TAIL))
+        tail = stream.read()
+    end = tail.rfind(b"PK\x05\x06")
+    listed = int.from_bytes(tail[end + 12 : end + 16], "little") if end >= 0 else 0
+    if listed > _MOST_LISTED or (end >= 20 and tail[end - 20 : end - 16] == b"PK\x06\x07"):
+        raise refused(f"{path} lists far more members than {what} has; pack it again")
     with zipfile.ZipFile(path) as archive:
         size = sum(member.file_size for member in archive.infolist())
     if size > MOST_DATA:

@@ -37,6 +37,7 @@ def build(
     units: Annotated[
         str | None, typer.Option(help="Of the file's numbers: m, cm, mm, um, in or ft.", metavar="U")
     ] = None,
+    up_axis: options.UpAxis = None,
     wall: Annotated[
         str | None,
         typer.Option(help="Wall of a hollow thing of which the file is the outside, as 2mm.", metavar="L"),
@@ -98,7 +99,7 @@ def build(
     if sensor is not None and only != "touch":
         raise WrongUse(f"--sensor is of touch, and --only {only} was asked for")
     thick = options.quantity("--wall", wall, LENGTH)
-    wanted = PartRequest(mesh, named(material), profile, units, thick, licence, seed)
+    wanted = PartRequest(mesh, named(material), profile, units, thick, licence, seed, up_axis)
     limit, longest = options.quantity("--up-to", up_to, FREQUENCY), options.quantity("--edge", edge, LENGTH)
     with hold_folder(out):
         if only == "touch":

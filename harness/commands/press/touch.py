@@ -115,6 +115,7 @@ def touch(
     units: Annotated[
         str | None, typer.Option(help="Of the mesh file's numbers: m, cm, mm, um, in or ft.", metavar="U")
     ] = None,
+    up_axis: options.UpAxis = None,
     objectfile: Annotated[
         Path | None,
         typer.Option(
@@ -171,11 +172,11 @@ def touch(
     if (mesh is None) == (height is None):
         refuse("say what is pressed: either a MESH with --contact X Y Z, or --height FILE.npy")
     if height is not None:
-        of_mesh = (contact, vertex, depth, tilt, azimuth, yaw, units, objectfile)
+        of_mesh = (contact, vertex, depth, tilt, azimuth, yaw, units, up_axis, objectfile)
         if any(given is not None for given in of_mesh):
             refuse(
-                "--contact, --vertex, --depth, --tilt, --azimuth, --yaw, --units and --objectfile are of a "
-                "mesh; --height is a map"
+                "--contact, --vertex, --depth, --tilt, --azimuth, --yaw, --units, --up-axis and --objectfile "
+                "are of a mesh; --height is a map"
             )
         touched = sources.of_heights(height, heights_of, reached, gel, levels, force)
     else:
@@ -185,7 +186,9 @@ def touch(
             )
         assert mesh is not None
         pose = (depth, tilt, azimuth, yaw)
-        touched = sources.of_mesh(mesh, units, contact, vertex, pose, gel, levels, objectfile, force)
+        touched = sources.of_mesh(
+            mesh, (units, up_axis), contact, vertex, pose, gel, levels, objectfile, force
+        )
     if pressure_out is not None:
         _write_pressure(pressure_out, touched)
     return _finish(touched, {"calibration": loaded}, out, live, picture, height_out, json)

@@ -70,7 +70,7 @@ def of_heights(
     read = time.perf_counter() - begun
     missing = given.missing if reached is None else given.missing | reached.missing
     touched = None if reached is None else reached.heights
-    scene = _scene(str(path), None, gel)
+    scene = _scene(str(path), (None, None), gel)
     press = press_heights(given.heights, kind, gel, scene, levels, touched, missing, force)
     return Touched(press, str(path), seconds={"read": read})
 
@@ -87,7 +87,7 @@ def _heights_of(text: str) -> "Heights":
 
 def of_mesh(
     mesh: str,
-    units: str | None,
+    file: tuple[str | None, str | None],
     contact: places.Coordinates | None,
     vertex: int | None,
     pose: tuple[str | None, str | None, str | None, str | None],
@@ -96,7 +96,19 @@ def of_mesh(
     objectfile: Path | None = None,
     force: bool = False,
 ) -> Touched:
-    """The press of a mesh; ``pose`` is depth, tilt, azimuth and yaw with their units, None where left out."""
+    """Press a mesh onto a gel.
+
+    Args:
+        mesh: a file, a built-in object or an ObjectFile.
+        file: unit of the file's numbers and axis that points up; None where left out.
+        contact: where it is pressed, or None.
+        vertex: number of the vertex where it is pressed, or None.
+        pose: depth, tilt, azimuth and yaw with their units; None where left out.
+        gel: onto which it is pressed.
+        levels: of knobs.
+        objectfile: folder of the object's networks.
+        force: whether the force is computed.
+    """
     from harness.basics.quantities import ANGLE, LENGTH
     from harness.effects.scene_object import known_object
     from harness.effects.touch_press import press_mesh
@@ -109,7 +121,7 @@ def of_mesh(
         for option, text in zip(("--tilt", "--azimuth", "--yaw"), pose[1:], strict=True)
     )
     begun = time.perf_counter()
-    scene = _scene(mesh, units, gel, objectfile)
+    scene = _scene(mesh, file, gel, objectfile)
     known = known_object(scene)
     place = places.pressed_place(known.mesh, contact, vertex)
     at = gel_from_object(place, depth, tilt, azimuth, yaw, gel.sensor.gel_thickness)
@@ -124,7 +136,9 @@ def of_mesh(
     return Touched(press, mesh, place, at, asked, (*known.read, *known.warnings), seconds={"mesh": read})
 
 
-def _scene(what: str, units: str | None, gel: "Gel", objectfile: Path | None = None) -> "SceneFile":
+def _scene(
+    what: str, file: tuple[str | None, str | None], gel: "Gel", objectfile: Path | None = None
+) -> "SceneFile":
     """A table with nothing on it but what is touched; touch does not depend on its material."""
     from harness.basics.toml_file import validate
     from harness.bench.scene import SceneFile, scene_from_options
@@ -138,5 +152,5 @@ def _scene(what: str, units: str | None, gel: "Gel", objectfile: Path | None = N
         says_its_own = what.startswith(BUILTIN) or holds_objectfile(objectfile_folder(what, Path.cwd()))
         material = None if says_its_own else "steel"
         named = None if objectfile is None else str(objectfile)
-        scene = scene_from_options(what, material, units, objectfile=named)
+        scene = scene_from_options(what, material, file[0], objectfile=named, up_axis=file[1])
     return scene.model_copy(update={"sensors": scene.sensors.model_copy(update={"noise": gel.noise > 0.0})})

@@ -43,6 +43,7 @@ def run(
     object_: options.Object = None,
     material: options.Material = None,
     units: options.Units = None,
+    up_axis: options.UpAxis = None,
     wall: options.Wall = None,
     objectfile: options.ObjectFileOption = None,
     seed: options.Seed = None,
@@ -108,7 +109,8 @@ def run(
 
     keys: dict[str, Any] = {"contacts": contacts, "presses": presses, "spacing": spacing, "yaw": yaw}
     wanted = SceneOptions(
-        scene, object_, material, units, wall, objectfile, sense, range_, keys, tuple(set_ or ())
+        *(scene, object_, material, units, wall, objectfile, sense, range_, keys, tuple(set_ or ())),
+        up_axis=up_axis,
     )
     on = BenchOptions(station, seed, gap, bench, out)
     levels = level or []

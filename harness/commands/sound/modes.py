@@ -33,6 +33,7 @@ def modes(
     units: Annotated[
         str | None, typer.Option(help="Of the file's numbers: m, cm, mm, um, in or ft.", metavar="U")
     ] = None,
+    up_axis: options.UpAxis = None,
     young: Annotated[str | None, typer.Option(help="Young's modulus, as 210GPa.", metavar="E")] = None,
     poisson: Annotated[float | None, typer.Option(help="Poisson's ratio.", metavar="NU")] = None,
     density: Annotated[str | None, typer.Option(help="Density, as 7.85g/cm^3.", metavar="RHO")] = None,
@@ -99,6 +100,7 @@ def modes(
         edge=options.quantity("--edge", edge, LENGTH),
         envelope=options.quantity("--envelope", envelope, LENGTH),
         fixed=fixed or (),
+        up_axis=up_axis,
         store=Store(default_folder()),
     )
     if not json:

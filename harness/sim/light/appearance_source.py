@@ -12,7 +12,12 @@ from harness.sim.light.appearance_read import read_appearance
 
 
 def appearance_of(
-    mesh: str, units: str | None, scale: float = 1.0, edge: float = 1.5e-3, crease: float = CREASE
+    mesh: str,
+    units: str | None,
+    scale: float = 1.0,
+    edge: float = 1.5e-3,
+    crease: float = CREASE,
+    up_axis: str | None = None,
 ) -> Appearance:
     """What an object looks like, in metres, in the object's frame.
 
@@ -23,6 +28,7 @@ def appearance_of(
         edge: m between vertices of a built-in object; half of what touch and sound take, since outlines
             show corners.
         crease: rad, as of ``appearance.smooth_normals``.
+        up_axis: axis of the file that points up, as at intake.
 
     Raises:
         WrongUse: no such object or unit, or a scale or an edge that is none.
@@ -31,7 +37,7 @@ def appearance_of(
     if not mesh.startswith(BUILTIN):
         if units is None:
             raise WrongUse(f"{mesh} has colours to be read and its unit is not known; say m, cm, mm or in")
-        return read_appearance(Path(mesh), units, scale, crease)
+        return read_appearance(Path(mesh), units, scale, crease, up_axis)
     return builtin_appearance(mesh.removeprefix(BUILTIN), scale, edge, crease)
 
 

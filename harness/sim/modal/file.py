@@ -72,6 +72,7 @@ class _Asked:
     count: int | None
     edge: float | None
     envelope: float | None
+    up_axis: str | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +99,7 @@ def modes_of_file(
     store: Store | None = None,
     envelope: float | None = None,
     begin: Begin = ignore_stage,
+    up_axis: str | None = None,
 ) -> FileModes:
     """The modes of an object given by a file, or of one of our own.
 
@@ -115,6 +117,7 @@ def modes_of_file(
         envelope: m, how far cells may leave the surface; None for ``tetrahedralize``'s own; not for
             tetrahedra.
         begin: called as each stage begins.
+        up_axis: axis of the file that points up, "x", "y" or "z"; None for the one that it declares, else z.
 
     Raises:
         WrongUse: options that cannot be, or that do not go together.
@@ -124,7 +127,7 @@ def modes_of_file(
     check_elasticity(Elasticity.uniform(material, 1), 1)
     seconds = dict.fromkeys(("intake", "mesh"), 0.0)
     highest = _highest(limit, count)
-    asked = _Asked(str(mesh), material, units, wall, highest, count, edge, envelope)
+    asked = _Asked(str(mesh), material, units, wall, highest, count, edge, envelope, up_axis)
     taken = _volume(asked, seconds)
     volume = taken is not None
     if taken is None:
@@ -157,7 +160,7 @@ def _volume(asked: _Asked, seconds: dict[str, float]) -> _Taken | None:
         return None
     path = Path(asked.mesh)
     with _timed(seconds, "intake"):
-        found = read_volume(path, asked.units)
+        found = read_volume(path, asked.units, asked.up_axis)
     if found is None:
         return None
     for name, value in (("--wall", asked.wall), ("--edge", asked.edge), ("--envelope", asked.envelope)):
@@ -168,7 +171,7 @@ def _volume(asked: _Asked, seconds: dict[str, float]) -> _Taken | None:
 
 def _surface(asked: _Asked, seconds: dict[str, float], store: Store | None) -> _Taken:
     with _timed(seconds, "intake"):
-        given = surface_of(asked.mesh, asked.units, asked.wall)
+        given = surface_of(asked.mesh, asked.units, asked.wall, asked.up_axis)
         surface = given.mesh
         check_closed(surface)
     with _timed(seconds, "mesh"):

@@ -54,6 +54,7 @@ class IntakeReport:
         repairs: what was done, in order.
         warnings: what the operator should look at.
         seconds: how long it took.
+        up_axis: how the file was rotated, for people; empty where its z was up.
     """
 
     file: str
@@ -74,6 +75,7 @@ class IntakeReport:
     repairs: tuple[str, ...]
     warnings: tuple[str, ...]
     seconds: float
+    up_axis: str = ""
 
     def mass(self, density: float) -> float | None:
         """Kilograms at ``density`` kg/m^3; None where neither a wall nor a closed surface says.
@@ -88,12 +90,20 @@ class IntakeReport:
     def summary(self) -> str:
         """What was read, in one line: every command that takes a mesh file says it."""
         return read_line(
-            self.file, self.bodies, self.faces, self.volume, self.longest_side, self.units, self.units_from
+            *(self.file, self.bodies, self.faces, self.volume, self.longest_side),
+            *(self.units, self.units_from, self.up_axis),
         )
 
 
 def read_line(
-    file: str, pieces: int, triangles: int, volume: float | None, longest: float, units: str, source: str
+    file: str,
+    pieces: int,
+    triangles: int,
+    volume: float | None,
+    longest: float,
+    units: str,
+    source: str,
+    up_axis: str = "",
 ) -> str:
     """What was read of a mesh file.
 
@@ -105,11 +115,12 @@ def read_line(
         longest: m, its longest side.
         units: that its numbers were taken in.
         source: where the unit came from.
+        up_axis: how it was rotated, for people; empty where its z was up.
     """
     held = "open, no volume" if volume is None else f"{1e6 * volume:.4g} cm^3"
     return (
         f"{file}: {pieces} piece{'s' if pieces > 1 else ''}, {triangles} triangles, {held}, longest side "
-        f"{1e3 * longest:.4g} mm; unit {units} ({source})"
+        f"{1e3 * longest:.4g} mm; unit {units} ({source}){up_axis and '; '}{up_axis}"
     )
 
 
@@ -121,7 +132,13 @@ class Intake:
     report: IntakeReport
 
 
-def take_in(path: Path, units: str | None, scale: float = 1.0, wall: float | None = None) -> Intake:
+def take_in(
+    path: Path,
+    units: str | None,
+    scale: float = 1.0,
+    wall: float | None = None,
+    up_axis: str | None = None,
+) -> Intake:
     """Read, weld, clean, orient and measure a mesh.
 
     Args:
@@ -130,9 +147,11 @@ def take_in(path: Path, units: str | None, scale: float = 1.0, wall: float | Non
             one that gives a size between 5 mm and 2 m.
         scale: factor on top of the unit, greater than zero.
         wall: metres, the wall thickness of a hollow thing of which the file has the outside.
+        up_axis: axis of the file that points up, "x", "y" or "z"; None for the one that it declares, else z.
 
     Returns:
-        The mesh in metres in the file's own frame, outward, and a report.
+        The mesh in metres in the object's frame, outward, and a report. The object's frame is the file's,
+        rotated about its origin until the up axis is z.
 
     Raises:
         WrongUse: an unknown unit, a bad scale or wall, or two readings of the size.
@@ -140,10 +159,10 @@ def take_in(path: Path, units: str | None, scale: float = 1.0, wall: float | Non
     """
     begun = time.perf_counter()
     _check_arguments(units, scale, wall)
-    raw = read_mesh(path)
+    raw = read_mesh(path, up_axis)
     surface = _cleaned(raw, path.name)
-    unit, source = _unit(units, raw.unit, surface.size, path.name)
-    surface.vertices = surface.vertices * (METRES[unit] * scale)
+    unit, source, metres = _unit(units, raw, surface.size, path.name)
+    surface.vertices = surface.vertices * (metres * scale)
     _check_size(surface.size, unit, scale, path.name)
     pieces, watertight = _closed(surface)
     drop_flat(surface)
@@ -169,6 +188,7 @@ def take_in(path: Path, units: str | None, scale: float = 1.0, wall: float | Non
         repairs=tuple(surface.repairs),
         warnings=(*raw.notes, *_warnings(mesh, watertight, pieces, wall)),
         seconds=time.perf_counter() - begun,
+        up_axis=raw.up_axis,
     )
     return Intake(mesh, report)
 
@@ -220,15 +240,17 @@ def _closed(surface: RepairedSurface) -> tuple[int, bool]:
     return pieces, is_watertight(surface.faces)
 
 
-def _unit(asked: str | None, declared: str | None, size: float, name: str) -> tuple[str, str]:
+def _unit(asked: str | None, raw: RawMesh, size: float, name: str) -> tuple[str, str, float]:
+    """The unit's name, where it came from, and its length in metres."""
+    declared = raw.unit
     if asked is not None:
         against = f", against the {declared} that the file declares" if declared not in (None, asked) else ""
-        return asked, f"asked{against}"
-    if declared is not None:
-        return declared, "declared by the file"
+        return asked, f"asked{against}", METRES[asked]
+    if declared is not None and raw.metres is not None:
+        return declared, "declared by the file", raw.metres
     readings = [unit for unit in _ASKED_ABOUT if _SMALLEST <= size * METRES[unit] <= _LARGEST]
     if len(readings) == 1:
-        return readings[0], "the only reading of its size"
+        return readings[0], "the only reading of its size", METRES[readings[0]]
     if not readings:
         raise MeshRefused(
             f"{name}: the longest side is {size:.4g}; read as m, cm or mm that is never between "

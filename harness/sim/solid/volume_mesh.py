@@ -8,10 +8,11 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused, WrongUse
+from harness.basics.geometry import rotate_upright
 from harness.sim.solid.coordinates import move_near
 from harness.sim.solid.formats.cells import CellFile
 from harness.sim.solid.intake import read_line
-from harness.sim.solid.mesh_read import METRES, SOLIDS, TETRAHEDRA, mesh_kind, read_cells
+from harness.sim.solid.mesh_read import METRES, SOLIDS, TETRAHEDRA, choose_up_axis, mesh_kind, read_cells
 from harness.sim.solid.modal_mesh import QuadraticMesh, quadratic_mesh, six_node_faces
 from harness.sim.solid.tetrahedra import signed_volumes
 from harness.sim.solid.volume_mesh_checks import (
@@ -24,7 +25,7 @@ from harness.sim.solid.volume_mesh_checks import (
     turned,
 )
 
-_SURFACES_ONLY = frozenset({".obj", ".stl", ".stl_ascii", ".ply", ".off", ".glb", ".gltf", ".3mf"})
+_SURFACES_ONLY = frozenset({".obj", ".stl", ".stl_ascii", ".ply", ".off", ".glb", ".gltf", ".3mf", ".dae"})
 _READINGS = ("m", "cm", "mm")
 _SMALLEST, _LARGEST = 5e-3, 2.0
 
@@ -53,7 +54,7 @@ class VolumeMesh:
     said: tuple[str, ...]
 
 
-def read_volume(path: Path, units: str | None = None) -> VolumeMesh | None:
+def read_volume(path: Path, units: str | None = None, up_axis: str | None = None) -> VolumeMesh | None:
     """The tetrahedra of a file; ten-node ones as they are, four-node ones with a node in every edge.
 
     Cells that are numbered the other way round are turned, unused nodes left out, and middle nodes
@@ -64,6 +65,7 @@ def read_volume(path: Path, units: str | None = None) -> VolumeMesh | None:
         path: any file that meshio reads.
         units: "m", "cm", "mm" or "in", of any size; None for the only one of m, cm and mm in which
             the longest side is between 5 mm and 2 m.
+        up_axis: axis of the file that points up, "x", "y" or "z", as at intake; None for z.
 
     Returns:
         None where the file holds no tetrahedra: it is for ``harness.sim.solid.intake``.
@@ -83,6 +85,8 @@ def read_volume(path: Path, units: str | None = None) -> VolumeMesh | None:
     nodes = read.points
     nodes, cells, number, said = _compacted(nodes, cells, path.name)
     nodes, moved = move_near(nodes, cells, path.name, read.single)
+    axis, rotated = choose_up_axis(up_axis, None)
+    nodes = rotate_upright(nodes, axis)
     longest = float(np.ptp(nodes, axis=0).max())
     unit, source = _unit(units, longest, path.name)
     mesh, done, quality = _oriented(nodes * METRES[unit], cells)
@@ -90,7 +94,8 @@ def read_volume(path: Path, units: str | None = None) -> VolumeMesh | None:
     named = {name: number[np.asarray(nodes_of, dtype=np.int64)] for name, nodes_of in read.point_sets.items()}
     sets = {name: found[found >= 0] for name, found in named.items()}
     volume = float(signed_volumes(mesh.nodes, mesh.cells).sum())
-    summary = read_line(path.name, bodies, len(mesh.faces), volume, longest * METRES[unit], unit, source)
+    size = longest * METRES[unit]
+    summary = read_line(path.name, bodies, len(mesh.faces), volume, size, unit, source, rotated)
     return VolumeMesh(
         mesh,
         sets,

@@ -1,0 +1,629 @@
+"""glTF 2.0 and GLB: triangles of the default scene with their colours, or a refusal that names the cause.
+
+Everything that the file requires is either followed or refused by its name. Every number of the file that
+leads to memory is compared with the bytes that the file holds before anything is allocated.
+"""
+
+import base64
+import binascii
+import json
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.errors import MeshRefused
+from harness.basics.files.foreign_file import MOST_DATA, MOST_JSON, read_bounded
+from harness.basics.files.referenced_file import referenced_path
+from harness.sim.solid.coordinates import move_near
+from harness.sim.solid.formats.parts import (
+    MAX_VERTICES,
+    MeshFile,
+    MeshPart,
+    Picture,
+    require_placed,
+    require_triangles,
+    transform_part,
+)
+
+_INSTANCES = "EXT_mesh_gpu_instancing"
+_TRANSFORM = "KHR_texture_transform"
+_DRACO = "KHR_draco_mesh_compression"
+_WEBP = "EXT_texture_webp"
+_GLOSSY = "KHR_materials_pbrSpecularGlossiness"
+_READ = frozenset({_INSTANCES, _TRANSFORM, _WEBP, _GLOSSY, "KHR_mesh_quantization", "KHR_materials_unlit"})
+_HARMLESS = frozenset({"KHR_lights_punctual", "KHR_xmp", "KHR_xmp_json_ld"})
+"""Extensions that change neither the shape nor the colours of an object."""
+
+_FALLBACK = frozenset({"EXT_meshopt_compression", "KHR_meshopt_compression", _DRACO, "KHR_texture_basisu"})
+"""Extensions next to which a file keeps plain data, unless it requires them."""
+
+_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_REPEAT = 10497
+_MAX_INDEX = 2**53
+
+
+def read_gltf(path: Path, colours: bool = False) -> MeshFile:
+    """Read the triangles of the default scene.
+
+    Args:
+        path: ``.gltf`` or ``.glb``; the content decides which.
+        colours: whether colours and textures are read too.
+
+    Raises:
+        MeshRefused: a damaged file, one that refers outside its folder, or one that requires an extension
+            that is not read.
+    """
+    data = read_bounded(path, "a mesh", refused=MeshRefused)
+    if data[:4] == b"glTF":
+        tree, binary = _split_glb(data, path.name)
+    else:
+        tree, binary = _parse_json(data, path.name), None
+    return _Reader(path, tree, binary, colours).read()
+
+
+def _split_glb(data: bytes, name: str) -> tuple[dict[str, Any], bytes | None]:
+    """The JSON tree and the binary chunk of a GLB."""
+    if len(data) < 20:
+        raise MeshRefused(
+            f"{name} is cut short: {len(data)} bytes, and a GLB begins with 20; export it again"
+        )
+    version, length = struct.unpack_from("<II", data, 4)
+    if version != 2:
+        raise MeshRefused(f"{name} is a GLB of version {version}; export it as glTF 2.0")
+    if length > len(data):
+        raise MeshRefused(
+            f"{name} is cut short: it states {length:,} bytes and has {len(data):,}; export it again"
+        )
+    chunks: dict[bytes, bytes] = {}
+    at = 12
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<I4s", data, at)
+        if at + 8 + size > length:
+            raise MeshRefused(
+                f"{name} is cut short: a chunk of {size:,} bytes begins at byte {at + 8:,} of {length:,}; "
+                "export it again"
+            )
+        chunks.setdefault(kind, data[at + 8 : at + 8 + size])
+        at += 8 + size
+    if b"JSON" not in chunks:
+        raise MeshRefused(f"{name} has no JSON chunk; export it again")
+    return _parse_json(chunks[b"JSON"], name), chunks.get(b"BIN\0")
+
+
+def _parse_json(data: bytes, name: str) -> dict[str, Any]:
+    if len(data) > MOST_JSON and b'"data:' not in data:
+        raise MeshRefused(
+            f"{name} has {len(data) / 2**20:,.0f} MiB of JSON; at most {MOST_JSON / 2**20:,.0f} MiB are read"
+        )
+    try:
+        tree = json.loads(data.decode("utf-8-sig"))
+    except (ValueError, RecursionError, MemoryError) as error:
+        raise MeshRefused(
+            f"{name} is no readable JSON: it is cut short or damaged, export it again"
+        ) from error
+    if not isinstance(tree, dict):
+        raise MeshRefused(f"{name} is JSON, but no glTF: its top level is no object; export it again")
+    return tree
+
+
+@dataclass(eq=False)
+class _Reader:
+    """One file's tree with checked access to it."""
+
+    path: Path
+    tree: dict[str, Any]
+    binary: bytes | None
+    colours: bool
+    notes: list[str] = field(default_factory=list)
+    colour_notes: list[str] = field(default_factory=list)
+    loaded: dict[int, bytes] = field(default_factory=dict)
+    meshes: dict[int, tuple[MeshPart, ...]] = field(default_factory=dict)
+
+    def read(self) -> MeshFile:
+        self._check_version()
+        self._check_extensions()
+        parts: list[MeshPart] = []
+        triangles = placed = 0
+        reached: set[int] = set()
+        for node, matrix in self._placed_nodes():
+            if "mesh" not in node:
+                continue
+            number = self.index(node["mesh"], "meshes", "a node's mesh")
+            reached.add(number)
+            own = self._mesh(number, node)
+            instances = self._instances(node)
+            placed += len(own) * len(instances)
+            triangles += sum(len(part.faces) for part in own) * len(instances)
+            require_placed(placed, self.path.name)
+            require_triangles(triangles, self.path.name)
+            parts += [transform_part(part, matrix @ local) for local in instances for part in own]
+        missing = len(self.entries("meshes")) - len(reached)
+        if missing:
+            self.notes.append(f"{missing} meshes that the default scene does not place are left out")
+        if not parts:
+            raise MeshRefused(f"{self.path.name} holds no triangle; export a surface")
+        return MeshFile(
+            tuple(parts),
+            1.0,
+            "y",
+            tuple(dict.fromkeys(self.notes)),
+            tuple(dict.fromkeys(self.colour_notes)),
+        )
+
+    # Checked access
+
+    def refuse(self, reason: str) -> MeshRefused:
+        return MeshRefused(f"{self.path.name}: {reason}; the file is damaged, export it again")
+
+    def entries(self, key: str) -> list[Any]:
+        found = self.tree.get(key, [])
+        if not isinstance(found, list):
+            raise self.refuse(f"{key} is no list")
+        return found
+
+    def index(self, value: Any, key: str, what: str) -> int:
+        """``value`` if it is an index into the file's list ``key``."""
+        count = len(self.entries(key))
+        if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < count:
+            raise self.refuse(f"{what} is number {_shown(value)} of {count} {key}")
+        return value
+
+    def entry(self, key: str, value: Any, what: str) -> dict[str, Any]:
+        """Entry ``value`` of the file's list ``key``."""
+        return self.mapping(self.entries(key)[self.index(value, key, what)], what)
+
+    def mapping(self, value: Any, what: str) -> dict[str, Any]:
+        if not isinstance(value, dict):
+            raise self.refuse(f"{what} is no JSON object")
+        return value
+
+    def count(self, value: Any, what: str, least: int = 0) -> int:
+        if not isinstance(value, int) or isinstance(value, bool) or not least <= value < _MAX_INDEX:
+            raise self.refuse(f"{what} is {_shown(value)}; a whole number of at least {least} is needed")
+        return value
+
+    def numbers(self, value: Any, length: int, what: str) -> FloatArray:
+        good = isinstance(value, list) and len(value) == length
+        if not good or not all(isinstance(each, (int, float)) for each in value):
+            raise self.refuse(f"{what} is {_shown(value)}; {length} numbers are needed")
+        try:
+            found = np.array(value, np.float64)
+        except OverflowError:
+            found = np.full(length, np.inf)
+        if not np.all(np.isfinite(found)):
+            raise self.refuse(f"{what} is {_shown(value)}; {length} finite numbers are needed")
+        return found
+
+    def extension(self, of: dict[str, Any], name: str) -> dict[str, Any] | None:
+        extensions = self.mapping(of.get("extensions", {}), "extensions")
+        return self.mapping(extensions[name], name) if name in extensions else None
+
+    # What the file requires
+
+    def _check_version(self) -> None:
+        asset = self.mapping(self.tree.get("asset", {}), "asset")
+        version = asset.get("minVersion", asset.get("version"))
+        if not isinstance(version, str) or not version.startswith("2."):
+            raise MeshRefused(f"{self.path.name} is glTF of version {_shown(version)}; export it as glTF 2.0")
+
+    def _check_extensions(self) -> None:
+        for name in self.entries("extensionsRequired"):
+            if name not in _READ | _HARMLESS:
+                raise MeshRefused(
+                    f"{self.path.name} requires the glTF extension {_shown(name)}, which is not read; export "
+                    "it without this extension"
+                )
+        unread = [
+            str(name) for name in self.entries("extensionsUsed") if name not in _READ | _HARMLESS | _FALLBACK
+        ]
+        materials = [name for name in unread if "_materials_" in name or "_texture_" in name]
+        if materials:
+            self.colour_notes.append(f"glTF extensions that are not followed: {', '.join(materials)}")
+        if len(unread) > len(materials):
+            others = ", ".join(name for name in unread if name not in materials)
+            self.notes.append(f"glTF extensions that are not followed: {others}")
+
+    # Bytes
+
+    def _buffer(self, number: int) -> bytes:
+        if number not in self.loaded:
+            buffer = self.entry("buffers", number, "a buffer")
+            length = self.count(buffer.get("byteLength"), "a buffer's byteLength", 1)
+            if "uri" in buffer:
+                data = self._resource(buffer["uri"], "a buffer")
+            elif number == 0 and self.binary is not None:
+                data = self.binary
+            else:
+                named = self.mapping(buffer.get("extensions", {}), "extensions")
+                because = f" (the data is in {', '.join(named)})" if named else ""
+                raise self.refuse(f"buffer {number} has no data{because}")
+            if len(data) < length:
+                raise self.refuse(f"buffer {number} states {length:,} bytes and has {len(data):,}")
+            self.loaded[number] = data[:length]
+        return self.loaded[number]
+
+    def _resource(self, uri: Any, what: str) -> bytes:
+        """The bytes of a data URI or of a file in the mesh's folder."""
+        if not isinstance(uri, str):
+            raise self.refuse(f"the address of {what} is {_shown(uri)}")
+        if uri.startswith("data:"):
+            head, comma, body = uri.partition(",")
+            if not comma or not head.endswith(";base64"):
+                raise self.refuse(f"the data URI of {what} is not base64")
+            try:
+                return base64.b64decode(body, validate=True)
+            except (binascii.Error, ValueError) as error:
+                raise self.refuse(f"the data URI of {what} is not base64") from error
+        found = referenced_path(self.path, uri, MeshRefused)
+        if found is None:
+            raise MeshRefused(
+                f"{self.path.name} refers to {uri!r} for {what}, and there is no such file in its folder"
+            )
+        return read_bounded(found, what, MOST_DATA, MeshRefused)
+
+    def _view(self, number: Any, what: str) -> tuple[bytes, int]:
+        """The bytes of a buffer view, and its stride (0 where it states none)."""
+        view = self.entry("bufferViews", number, what)
+        compressed = [name for name in view.get("extensions", {}) if "meshopt" in name]
+        data = self._buffer(self.index(view.get("buffer"), "buffers", "a buffer view's buffer"))
+        offset = self.count(view.get("byteOffset", 0), "a buffer view's byteOffset")
+        length = self.count(view.get("byteLength"), "a buffer view's byteLength", 1)
+        if offset + length > len(data):
+            because = f" (compressed by {compressed[0]})" if compressed else ""
+            raise self.refuse(
+                f"buffer view {number} ends at byte {offset + length:,} of a buffer of {len(data):,}{because}"
+            )
+        return data[offset : offset + length], self.count(view.get("byteStride", 0), "a stride")
+
+    def accessor(self, number: Any, widths: tuple[str, ...], what: str) -> FloatArray:
+        """``(count, width)`` values of an accessor; normalised integers as 0 to 1 or -1 to 1."""
+        accessor = self.entry("accessors", number, what)
+        kind, component = accessor.get("type"), accessor.get("componentType")
+        if kind not in widths or component not in _COMPONENTS:
+            raise self.refuse(
+                f"{what} is of type {_shown(kind)} and component type {_shown(component)}; "
+                f"{' or '.join(widths)} is needed"
+            )
+        count = self.count(accessor.get("count"), f"the count of {what}", 1)
+        # More elements than this make more triangles than are read, whatever they are for.
+        if count > MAX_VERTICES:
+            raise self.refuse(f"{what} states {count:,} elements; at most {MAX_VERTICES:,} are read")
+        dtype, width = np.dtype(_COMPONENTS[component]), _WIDTHS[kind]
+        if "bufferView" in accessor:
+            offset = self.count(accessor.get("byteOffset", 0), f"the byteOffset of {what}")
+            values = self._strided(accessor["bufferView"], offset, count, width, dtype, what)
+        else:
+            values = np.zeros((count, width), dtype)
+        if "sparse" in accessor:
+            values = self._substituted(values, self.mapping(accessor["sparse"], "sparse"), what)
+        if accessor.get("normalized") is True and dtype.kind in "iu":
+            return np.asarray(np.maximum(values / float(np.iinfo(dtype).max), -1.0))
+        return np.asarray(values, np.float64)
+
+    def _strided(
+        self, view: Any, offset: int, count: int, width: int, dtype: "np.dtype[Any]", what: str
+    ) -> Any:
+        data, stride = self._view(view, f"the buffer view of {what}")
+        size = width * dtype.itemsize
+        stride = stride or size
+        if stride < size:
+            raise self.refuse(f"{what} has elements of {size} bytes every {stride} bytes")
+        if offset + stride * (count - 1) + size > len(data):
+            raise self.refuse(
+                f"{what} states {count:,} elements of {size} bytes in a view of {len(data):,} bytes"
+            )
+        return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize)).copy()
+
+    def _substituted(self, values: Any, sparse: dict[str, Any], what: str) -> Any:
+        """An accessor's values after its sparse substitution."""
+        count = self.count(sparse.get("count"), f"the sparse count of {what}", 1)
+        of = self.mapping(sparse.get("indices"), "the sparse indices")
+        new = self.mapping(sparse.get("values"), "the sparse values")
+        if of.get("componentType") not in (5121, 5123, 5125) or count > len(values):
+            raise self.refuse(f"the sparse part of {what} is no list of at most {len(values)} elements")
+        start = self.count(of.get("byteOffset", 0), "a sparse byteOffset")
+        where = self._strided(
+            of.get("bufferView"), start, count, 1, np.dtype(_COMPONENTS[of["componentType"]]), what
+        )[:, 0].astype(np.int64)
+        if where.max() >= len(values):
+            raise self.refuse(f"the sparse part of {what} changes element {where.max()} of {len(values)}")
+        start = self.count(new.get("byteOffset", 0), "a sparse byteOffset")
+        values[where] = self._strided(
+            new.get("bufferView"), start, count, values.shape[1], values.dtype, what
+        )
+        return values
+
+    # The scene
+
+    def _placed_nodes(self) -> Iterator[tuple[dict[str, Any], FloatArray]]:
+        """Every node of the default scene with its matrix in the scene; each at most once."""
+        nodes = self.entries("nodes")
+        scenes = self.entries("scenes")
+        if scenes:
+            scene = self.entry("scenes", self.tree.get("scene", 0), "the default scene")
+            roots = scene.get("nodes", [])
+        else:
+            children = {child for node in nodes for child in _children(node)}
+            roots = [number for number in range(len(nodes)) if number not in children]
+        waiting = [(number, np.eye(4)) for number in reversed(_listed(roots))]
+        seen: set[int] = set()
+        while waiting:
+            number, above = waiting.pop()
+            number = self.index(number, "nodes", "a node")
+            if number in seen:
+                raise self.refuse(f"node {number} is reached twice: nodes form a cycle or share a child")
+            seen.add(number)
+            node = self.mapping(nodes[number], "a node")
+            matrix = above @ self._matrix(node)
+            yield node, matrix
+            waiting += [(child, matrix) for child in reversed(_children(node))]
+
+    def _matrix(self, node: dict[str, Any]) -> FloatArray:
+        if "matrix" in node:
+            return np.ascontiguousarray(self.numbers(node["matrix"], 16, "a node's matrix").reshape(4, 4).T)
+        move = self.numbers(node.get("translation", [0, 0, 0]), 3, "a node's translation")
+        turn = self.numbers(node.get("rotation", [0, 0, 0, 1]), 4, "a node's rotation")
+        size = self.numbers(node.get("scale", [1, 1, 1]), 3, "a node's scale")
+        return np.asarray(self._composed(move[None], turn[None], size[None])[0])
+
+    def _composed(self, moves: FloatArray, turns: FloatArray, sizes: FloatArray) -> FloatArray:
+        """``(n, 4, 4)`` of translations, quaternions (x, y, z, w) and scales."""
+        lengths = np.linalg.norm(turns, axis=1)
+        if not np.all(np.isfinite(lengths) & (lengths > 0.0)):
+            raise self.refuse("a rotation is a quaternion of length zero")
+        x, y, z, w = (turns / lengths[:, None]).T
+        rotations = np.stack(
+            [
+                np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=1),
+                np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=1),
+                np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=1),
+            ],
+            axis=1,
+        )
+        matrices = np.tile(np.eye(4), (len(moves), 1, 1))
+        matrices[:, :3, :3] = rotations * sizes[:, None, :]
+        matrices[:, :3, 3] = moves
+        return matrices
+
+    def _instances(self, node: dict[str, Any]) -> FloatArray:
+        """``(n, 4, 4)``: where a node's mesh is placed within the node."""
+        instancing = self.extension(node, _INSTANCES)
+        if instancing is None:
+            return np.eye(4)[None]
+        named = self.mapping(instancing.get("attributes"), f"the attributes of {_INSTANCES}")
+        kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
+        found = {
+            name: self.accessor(named[name], (kind,), f"{_INSTANCES} {name}")
+            for name, kind in kinds.items()
+            if name in named
+        }
+        counts = {len(values) for values in found.values()}
+        if len(counts) != 1:
+            raise self.refuse(f"{_INSTANCES} has attributes of {sorted(counts)} instances")
+        count = counts.pop()
+        require_placed(count, self.path.name)
+        return self._composed(
+            found.get("TRANSLATION", np.zeros((count, 3))),
+            found.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))),
+            found.get("SCALE", np.ones((count, 3))),
+        )
+
+    # Meshes
+
+    def _mesh(self, number: int, node: dict[str, Any]) -> tuple[MeshPart, ...]:
+        """The primitives of a mesh, in the node's frame."""
+        if "skin" in node:
+            self.notes.append("a skinned mesh is read in the pose that it was modelled in")
+        mesh = self.mapping(self.entries("meshes")[number], "a mesh")
+        weights = _listed(node.get("weights", mesh.get("weights", [])))
+        if any(weights):
+            return tuple(self._primitives(mesh, weights))
+        if number not in self.meshes:
+            parts = tuple(self._primitives(mesh, []))
+            self._check_steps(parts)
+            self.meshes[number] = parts
+        return self.meshes[number]
+
+    def _check_steps(self, parts: tuple[MeshPart, ...]) -> None:
+        """Refuse a mesh so far from its own origin that 32 bits do not hold its shape."""
+        vertices = np.vstack([np.zeros((0, 3)), *(part.vertices for part in parts)])
+        if np.isfinite(vertices).all() and len(vertices) and np.ptp(vertices, axis=0).max() > 0.0:
+            move_near(vertices, np.arange(len(vertices)), self.path.name, single=True)
+
+    def _primitives(self, mesh: dict[str, Any], weights: list[Any]) -> Iterator[MeshPart]:
+        for entry in _listed(mesh.get("primitives", [])):
+            primitive = self.mapping(entry, "a primitive")
+            mode = primitive.get("mode", _TRIANGLES)
+            if mode not in (_TRIANGLES, _STRIP, _FAN):
+                self.notes.append("points and lines are left out")
+                continue
+            part = self._primitive(primitive, mode, weights)
+            if part is not None:
+                yield part
+
+    def _primitive(self, primitive: dict[str, Any], mode: int, weights: list[Any]) -> MeshPart | None:
+        attributes = self.mapping(primitive.get("attributes", {}), "attributes")
+        packed = self.extension(primitive, _DRACO) is not None
+        position = attributes.get("POSITION")
+        plain = position is not None and "bufferView" in self.entry("accessors", position, "POSITION")
+        if packed and not plain:
+            raise MeshRefused(
+                f"{self.path.name} holds triangles compressed by {_DRACO}, which is not read; export it "
+                "without compression"
+            )
+        if position is None:
+            self.notes.append("a primitive without positions is left out")
+            return None
+        vertices = self.accessor(position, ("VEC3",), "POSITION")
+        for target, weight in zip(_listed(primitive.get("targets", [])), weights, strict=False):
+            moved = self.mapping(target, "a morph target").get("POSITION")
+            amount = self.numbers([weight], 1, "the weight of a morph target")[0]
+            if moved is not None and amount:
+                shift = self.accessor(moved, ("VEC3",), "a morph target")
+                if len(shift) != len(vertices):
+                    raise self.refuse(f"a morph target moves {len(shift)} of {len(vertices)} vertices")
+                vertices = vertices + amount * shift
+        faces = self._faces(primitive, mode, len(vertices))
+        require_triangles(len(faces), self.path.name)
+        if not self.colours:
+            return MeshPart(vertices, faces)
+        return self._coloured(MeshPart(vertices, faces), primitive, attributes)
+
+    def _faces(self, primitive: dict[str, Any], mode: int, count: int) -> IntArray:
+        if "indices" in primitive:
+            accessor = self.entry("accessors", primitive["indices"], "indices")
+            if accessor.get("componentType") not in (5121, 5123, 5125):
+                raise self.refuse("indices are not unsigned integers")
+            order = self.accessor(primitive["indices"], ("SCALAR",), "indices")[:, 0].astype(np.int64)
+            if order.max() >= count:
+                raise self.refuse(f"a face has vertex {order.max()}, but there are {count} vertices")
+        else:
+            order = np.arange(count, dtype=np.int64)
+        if mode == _TRIANGLES:
+            if len(order) % 3:
+                raise self.refuse(f"{len(order)} indices are no whole number of triangles")
+            return order.reshape(-1, 3)
+        if len(order) < 3:
+            return np.zeros((0, 3), np.int64)
+        if mode == _FAN:
+            first = np.full(len(order) - 2, order[0])
+            return np.stack([first, order[1:-1], order[2:]], axis=1)
+        strip = np.stack([order[:-2], order[1:-1], order[2:]], axis=1)
+        strip[1::2] = strip[1::2, [1, 0, 2]]
+        return strip
+
+    # Colours
+
+    def _coloured(self, part: MeshPart, primitive: dict[str, Any], attributes: dict[str, Any]) -> MeshPart:
+        """A piece with its material: base colour times vertex colour times texture, all linear."""
+        factor, texture = np.ones(3), None
+        if "material" in primitive:
+            material = self.entry("materials", primitive["material"], "a material")
+            factor, texture = self._base_colour(material)
+        tints = np.broadcast_to(factor, (len(part.faces), 3, 3))
+        stated = "material" in primitive
+        if "COLOR_0" in attributes:
+            tints = tints * self._vertex_colours(attributes["COLOR_0"], len(part.vertices))[part.faces]
+            stated = True
+        if texture is None:
+            return MeshPart(part.vertices, part.faces, tints if stated else None)
+        picture, places = self._texture(texture, attributes, part)
+        return MeshPart(part.vertices, part.faces, tints, places, picture)
+
+    def _vertex_colours(self, number: Any, count: int) -> FloatArray:
+        colours = self.accessor(number, ("VEC3", "VEC4"), "COLOR_0")
+        accessor = self.entry("accessors", number, "COLOR_0")
+        dtype = np.dtype(_COMPONENTS[int(accessor["componentType"])])
+        if dtype.kind in "iu" and accessor.get("normalized") is not True:
+            colours = colours / float(np.iinfo(dtype).max)
+        if len(colours) != count or not np.all(np.isfinite(colours)):
+            raise self.refuse(f"COLOR_0 holds {len(colours)} colours for {count} vertices, or no numbers")
+        if colours.shape[1] == 4 and colours[:, 3].min() < 1.0:
+            self.colour_notes.append("vertex colours are partly transparent: rendered opaque")
+        return np.clip(colours[:, :3], 0.0, 1.0)
+
+    def _base_colour(self, material: dict[str, Any]) -> tuple[FloatArray, dict[str, Any] | None]:
+        """Linear ``(3,)`` factor, and the texture's entry."""
+        glossy = self.extension(material, _GLOSSY)
+        if glossy is not None and "pbrMetallicRoughness" not in material:
+            rough, factor_key, texture_key = glossy, "diffuseFactor", "diffuseTexture"
+        else:
+            rough = self.mapping(material.get("pbrMetallicRoughness", {}), "pbrMetallicRoughness")
+            factor_key, texture_key = "baseColorFactor", "baseColorTexture"
+        factor = self.numbers(rough.get(factor_key, [1, 1, 1, 1]), 4, factor_key)
+        if factor.min() < 0.0 or factor.max() > 1.0:
+            raise self.refuse(f"{factor_key} is {factor.tolist()}; 0 to 1 is needed")
+        if material.get("alphaMode", "OPAQUE") != "OPAQUE":
+            self.colour_notes.append(
+                f"a material has alphaMode {_shown(material['alphaMode'])}: rendered opaque"
+            )
+        unused: list[str] = [key for key in ("normalTexture", "emissiveTexture") if key in material]
+        if any(_listed(material.get("emissiveFactor", []))):
+            unused.append("emissiveFactor")
+        if unused:
+            self.colour_notes.append(f"not followed of a material: {', '.join(unused)}")
+        texture = rough.get(texture_key)
+        return factor[:3], None if texture is None else self.mapping(texture, texture_key)
+
+    def _texture(
+        self, info: dict[str, Any], attributes: dict[str, Any], part: MeshPart
+    ) -> tuple[Picture | None, FloatArray | None]:
+        transform = self.extension(info, _TRANSFORM) or {}
+        number = self.count(transform.get("texCoord", info.get("texCoord", 0)), "texCoord")
+        texture = self.entry("textures", info.get("index"), "a texture")
+        picture = self._picture(texture)
+        name = f"TEXCOORD_{number}"
+        if picture is None or name not in attributes:
+            if picture is not None:
+                self.colour_notes.append(f"a texture is mapped by {name}, which a piece has not: left out")
+            return None, None
+        at = self.accessor(attributes[name], ("VEC2",), name)
+        if len(at) != len(part.vertices) or not np.all(np.isfinite(at)):
+            raise self.refuse(
+                f"{name} holds {len(at)} places for {len(part.vertices)} vertices, or no numbers"
+            )
+        at = self._transformed(at, transform)
+        self._note_wrapping(texture, at)
+        return picture, np.stack([at[:, 0], 1.0 - at[:, 1]], axis=1)[part.faces]
+
+    def _transformed(self, at: FloatArray, transform: dict[str, Any]) -> FloatArray:
+        """Texture places after ``KHR_texture_transform``: scaled, turned counter-clockwise, then moved."""
+        scale = self.numbers(transform.get("scale", [1, 1]), 2, "a texture's scale")
+        offset = self.numbers(transform.get("offset", [0, 0]), 2, "a texture's offset")
+        angle = self.numbers([transform.get("rotation", 0)], 1, "a texture's rotation")[0]
+        cosine, sine = np.cos(angle), np.sin(angle)
+        # v points down: the rotation that looks counter-clockwise has the sine's other sign.
+        return np.asarray((at * scale) @ np.array([[cosine, sine], [-sine, cosine]]).T + offset)
+
+    def _note_wrapping(self, texture: dict[str, Any], at: FloatArray) -> None:
+        if "sampler" not in texture or (at.min() >= -1e-6 and at.max() <= 1.0 + 1e-6):
+            return
+        sampler = self.entry("samplers", texture["sampler"], "a sampler")
+        if any(sampler.get(key, _REPEAT) != _REPEAT for key in ("wrapS", "wrapT")):
+            self.colour_notes.append("a texture that the file clamps or mirrors at its edge is repeated")
+
+    def _picture(self, texture: dict[str, Any]) -> Picture | None:
+        webp = self.extension(texture, _WEBP)
+        source = texture.get("source") if webp is None else webp.get("source")
+        if source is None:
+            named = ", ".join(self.mapping(texture.get("extensions", {}), "extensions")) or "no source"
+            self.colour_notes.append(f"a texture cannot be read ({named}): its material's colour is used")
+            return None
+        image = self.entry("images", source, "an image")
+        if "bufferView" in image:
+            view = image["bufferView"]
+            return Picture(f"image {source}", partial(self._view_bytes, view))
+        uri = image.get("uri")
+        if not isinstance(uri, str):
+            raise self.refuse(f"image {source} has neither data nor an address")
+        if not uri.startswith("data:") and referenced_path(self.path, uri, MeshRefused) is None:
+            self.colour_notes.append(f"the texture {uri!r} is not there: its material's colour is used")
+            return None
+        name = f"image {source}" if uri.startswith("data:") else uri
+        return Picture(name, partial(self._resource, uri, "an image"))
+
+    def _view_bytes(self, view: Any) -> bytes:
+        return self._view(view, "the buffer view of an image")[0]
+
+
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []
+
+
+def _children(node: Any) -> list[Any]:
+    found = _listed(node.get("children", [])) if isinstance(node, dict) else []
+    return [child for child in found if isinstance(child, int)]
+
+
+def _shown(value: Any) -> str:
+    """A value of the file for a message: short, and without control characters."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
