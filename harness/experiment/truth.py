@@ -13,8 +13,8 @@ from harness.basics.errors import RecordingDamaged, TouchstoneError
 from harness.basics.files.foreign_file import MOST_DATA, read_bounded
 from harness.basics.mesh import Mesh
 from harness.basics.npz_file import read_arrays
-from harness.bench.truth_file import UNSUMMED, read_truth_file, surface_path
 from harness.recording.recording import Recording
+from harness.recording.truth_file import UNSUMMED, read_truth_file, surface_path
 
 
 @dataclass(frozen=True, eq=False)

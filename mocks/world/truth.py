@@ -9,7 +9,7 @@ from harness.basics.errors import TouchstoneError
 from harness.basics.geometry import apply
 from harness.basics.npz_file import write_arrays
 from harness.bench.station import STRIKE
-from harness.bench.truth_file import SCHEMA, read_truth_file, surface_path, write_truth_file
+from harness.recording.truth_file import SCHEMA, read_truth_file, surface_path, write_truth_file
 from mocks.world.world import World
 
 if TYPE_CHECKING:

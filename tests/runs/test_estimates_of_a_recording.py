@@ -13,10 +13,10 @@ from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import true_points
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
-from harness.bench.truth_file import write_truth_file
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
+from harness.recording.truth_file import write_truth_file
 from tests.support.localization import answer, chosen
 from tests.support.sessions import score
 from tests.support.whole_run import copied, edited, rewritten, with_reading

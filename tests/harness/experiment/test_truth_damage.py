@@ -13,11 +13,11 @@ import pytest
 from harness.basics.errors import DataRefused
 from harness.bench.scene import scene_from_options
 from harness.bench.station_file import load_station, station_path
-from harness.bench.truth_file import read_truth_file, write_truth_file
 from harness.effects.scene_object import known_object
 from harness.experiment.truth import Truth, read_truth, truth_or_notes, truth_paths
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles, create_run, station_calibration
+from harness.recording.truth_file import read_truth_file, write_truth_file
 from mocks.in_process.bench import in_process_bench
 
 

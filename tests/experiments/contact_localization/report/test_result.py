@@ -20,13 +20,13 @@ from experiments.contact_localization.report.result import estimate_of, flags_of
 from harness.basics.errors import RecordingDamaged
 from harness.basics.geometry import translation
 from harness.basics.symmetry import SymmetryGroup, find_symmetries
-from harness.bench.truth_file import write_truth_file
 from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import levels_of_result
 from harness.experiment.experiment import Scored
 from harness.experiment.truth import Truth, read_truth
 from harness.recording.observation import Observation
 from harness.recording.recording import Recording
+from harness.recording.truth_file import write_truth_file
 from tests.samples.synthetic_press import PRESSES
 from tests.support.localization import chosen, dials
 
