@@ -9,7 +9,7 @@ import numpy as np
 from experiments.scale_estimation.answer import OUTSIDE, Said, SizeAnswer
 from experiments.scale_estimation.size import Belief
 from experiments.scale_estimation.sound.hearing import Hearing
-from experiments.scale_estimation.touch.touch import DOUBTED, Touch
+from experiments.scale_estimation.touch.touch import Touch, doubted_cost
 from experiments.scale_estimation.unseen.answer import ShapelessAnswer
 from harness.basics.errors import FitRefused
 from harness.experiment.experiment import Scored
@@ -124,10 +124,12 @@ def _doubt(sense: str, one: Said) -> str | None:
             f"{sense}: the size is likely outside the range that was asked about "
             f"({100 * one.belief.outside:.0f} %); widen object.sizes"
         )
-    if isinstance(one, Touch) and one.cost > DOUBTED:
+    if isinstance(one, Touch) and one.is_doubted:
+        limit = doubted_cost(one.places)
         return (
-            f"touch: the contacts may be of another object: they cost {one.cost:.1f} each, and those of the "
-            f"right one seldom more than {DOUBTED:g}; the interval is widened for it; check the object"
+            f"touch: the contacts may be of another object: their mean misfit is {one.cost:.1f}, and "
+            f"{one.places} contacts with the right object are seldom above {limit:.1f}; the interval is "
+            "widened for it; check the object"
         )
     if _width(one.belief) > OPEN * _width(Belief.ignorant(one.belief.range)):
         return f"{sense} leaves the size open ({_span(one.belief)}); {_NARROWED_BY[sense]}"

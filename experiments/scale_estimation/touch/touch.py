@@ -29,6 +29,14 @@ DOUBTED = 0.7
 """Cost a contact beyond which they may be another object's: the right one's was 0.05 to 0.53 in 23 of 24
 runs, and 0.9 to 3.4 where contacts with another were not refused."""
 
+DOUBTED_PLACES = 10
+"""Places touched for which that limit holds. The mean cost of fewer contacts varies more: one contact on a
+rim, whose normal is uncertain, costs up to 1.5 alone."""
+
+MIN_JUDGED_PLACES = 4
+"""Places touched below which a misfit is no sign of another object: two or three contacts with the right
+object cost more than the limit in every second run (docs/results/scale.md)."""
+
 STRANGER = 0.5
 """Probability that they are, then: the size may be any."""
 
@@ -72,12 +80,28 @@ class Touch:
         unknowns: ``(UNKNOWNS,)`` the best.
         cost: of a contact, at the best.
         seconds: s of the estimate.
+        places: number of different places that were touched.
     """
 
     belief: Belief
     unknowns: FloatArray
     cost: float
     seconds: float
+    places: int = DOUBTED_PLACES
+
+    @property
+    def is_doubted(self) -> bool:
+        """Whether the contacts are a sign of another object."""
+        return self.places >= MIN_JUDGED_PLACES and self.cost > doubted_cost(self.places)
+
+
+def doubted_cost(places: int) -> float:
+    """Compute the mean cost of a contact above which the contacts may be of another object.
+
+    Args:
+        places: number of different places that were touched.
+    """
+    return DOUBTED * max(1.0, float(np.sqrt(DOUBTED_PLACES / places)))
 
 
 def by_touch(
@@ -131,7 +155,7 @@ def by_touch(
         scan.append(_scanned(fine, minima[k], float(least[k] - misfits[k])))
     belief = add_unevenness(Belief.of(sizes, -_least_of(np.vstack(scan), logs)))
     belief = belief.doubted(max(CHANCE ** (fine.places - 1), STRANGER if cost > DOUBTED else 0.0))
-    return Touch(belief, minima[best], cost, time.perf_counter() - began)
+    return Touch(belief, minima[best], cost, time.perf_counter() - began, fine.places)
 
 
 def _starts(stand: Stand, patches: Sequence[Patch], logs: FloatArray, everywhere: bool) -> FloatArray:

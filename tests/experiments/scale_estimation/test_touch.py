@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.scale_estimation.model import ObjectModel
-from experiments.scale_estimation.size import SizeRange
+from experiments.scale_estimation.size import STEP, Belief, SizeRange
 from experiments.scale_estimation.touch.fit import (
     THROUGH,
     UNKNOWNS,
@@ -17,7 +17,7 @@ from experiments.scale_estimation.touch.fit import (
     distinct_paths,
 )
 from experiments.scale_estimation.touch.patch import POINTS, Patch, patch_of
-from experiments.scale_estimation.touch.touch import by_touch
+from experiments.scale_estimation.touch.touch import Touch, by_touch, doubted_cost
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import rotation_about, transform
@@ -144,6 +144,47 @@ def test_a_path_to_the_same_place_again_is_no_new_evidence() -> None:
     made = contacts("tray", 1.0, 3)
     once, copied = (by_touch(stand, made, nominal, RANGE, free=[path] * times) for times in (1, 10))
     assert copied.belief.interval == pytest.approx(once.belief.interval)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_few_contacts_may_fit_any_size_by_chance(count: int) -> None:
+    """Each further contact halves the probability, which is then spread over all sizes."""
+    stand, nominal = stand_of("mug")
+    density = np.exp(by_touch(stand, contacts("mug", 1.0, count), nominal, RANGE).belief.log_density)
+    uniform = 1.0 / (STEP * len(density))
+    assert density.min() == pytest.approx(0.5 ** (count - 1) * uniform, rel=0.02)
+
+
+def with_wrong_normal(patch: Patch) -> Patch:
+    """A press on a rim: its points are right, and the normal of their plane is a quarter turn off."""
+    return replace(patch, normal=np.cross(patch.normal, np.roll(patch.normal, 1)))
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_one_contact_on_a_rim_among_few_is_no_sign_of_another_object(count: int) -> None:
+    stand, nominal = stand_of("mug")
+    first, *others = contacts("mug", 1.0, count)
+    found = by_touch(stand, [with_wrong_normal(first), *others], nominal, RANGE)
+    assert found.places == count
+    assert not found.is_doubted
+
+
+def test_the_limit_of_doubt_falls_with_the_number_of_places() -> None:
+    limits = [doubted_cost(places) for places in (1, 2, 5, 10, 40)]
+    assert limits == pytest.approx([2.2136, 1.5652, 0.9899, 0.7, 0.7], abs=1e-3)
+    belief = Belief.ignorant(RANGE)
+    assert Touch(belief, np.zeros(UNKNOWNS), 1.0, 0.0, 10).is_doubted
+    assert not Touch(belief, np.zeros(UNKNOWNS), 1.0, 0.0, 4).is_doubted
+    assert Touch(belief, np.zeros(UNKNOWNS), 1.2, 0.0, 4).is_doubted
+    assert not Touch(belief, np.zeros(UNKNOWNS), 3.0, 0.0, 3).is_doubted
+
+
+def test_doubted_contacts_leave_half_of_the_probability_to_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    stand, nominal = stand_of("mug")
+    monkeypatch.setattr("experiments.scale_estimation.touch.touch.DOUBTED", 0.0)
+    found = by_touch(stand, contacts("mug", 1.0, 10), nominal, RANGE)
+    density = np.exp(found.belief.log_density)
+    assert density.min() == pytest.approx(0.5 / (STEP * len(density)), rel=0.02)
 
 
 def test_contacts_on_one_side_leave_the_size_open() -> None:

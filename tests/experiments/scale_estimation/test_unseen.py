@@ -1,5 +1,6 @@
 """Size of an object never seen, from its outline: better than its box on shapes that were held out."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,10 @@ from scipy.sparse.csgraph import connected_components
 
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import SizeRange
+from experiments.scale_estimation.unseen.answer import ShapelessAnswer, outline_alone
 from experiments.scale_estimation.unseen.regression import by_outline, features_of, shipped
 from experiments.scale_estimation.unseen.training.outlines import fitted, pictures
+from harness.basics.errors import FitRefused
 from harness.bench.station_file import Station
 from harness.sim.solid.household.families import FAMILIES, draw
 from harness.sim.solid.surface_measure import enclosed_volume
@@ -67,6 +70,15 @@ def test_an_outline_unlike_all_household_things_widens_the_answer() -> None:
     usual, _ = pictures(24, seed=5)[:2]
     strange = usual[:1] + np.append(1.5 * np.tile([1.0, -1.0], 9), 0.0)
     assert shipped().size(strange)[1][0] > 2.0 * shipped().size(usual)[1].max()
+
+
+def test_an_outline_that_the_picture_cuts_off_is_refused_without_the_shape(station: Station) -> None:
+    outline = outline_at(view_of("bowl"), 1.0)
+    hidden = outline.hidden.copy()
+    hidden[3] = True
+    assert isinstance(outline_alone(outline, station.camera, PLACE, RANGE), ShapelessAnswer)
+    with pytest.raises(FitRefused, match="cut off by the picture's border; move the camera back"):
+        outline_alone(replace(outline, hidden=hidden), station.camera, PLACE, RANGE)
 
 
 def test_twice_as_far_and_twice_as_large_is_the_same_outline() -> None:

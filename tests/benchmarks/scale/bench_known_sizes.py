@@ -1,0 +1,113 @@
+"""Sizes of known shapes on meshes that nothing was tuned on: how often the 90 % intervals hold, and on which side.
+
+Run as ``PYTHONPATH=. python tests/benchmarks/scale/bench_known_sizes.py --recordings FOLDER``: one look and ten
+contacts of each mesh and seed, 10 s a run; the recordings are kept and answered again by the next call. The
+meshes are read from TOUCHSTONE_DATA or ../shared/data.
+"""
+
+import argparse
+import sys
+from collections import defaultdict
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+
+from experiments.scale_estimation.answer import ScaleAnswering
+from experiments.scale_estimation.dials import KNOBS
+from experiments.scale_estimation.size import Belief
+from experiments.scale_estimation.table import ScaleCell, scene_of
+from harness.basics.errors import FitRefused
+from harness.bench.scene import SceneFile, scene_from_json, scene_from_options
+from harness.bench.station_file import Station, load_station, station_path
+from harness.effects.accuracy import Accuracy
+from harness.experiment.lookup import named
+from harness.experiment.plain import perform_in_process
+from harness.experiment.truth import read_truth
+from harness.recording.run_folder import RunFiles
+from tests.support.real_data import find_shared_data
+
+MESHES = {
+    "lightbulb": ("contactdb_objects/lightbulb.stl", "glass"),
+    "fryingpan": ("contactdb_objects/fryingpan.stl", "steel"),
+    "scissors": ("ycb_ocrtoc/scissors/textured.obj", "steel"),
+    "drill": ("ycb_sim/035_power_drill/035_power_drill.obj", "plastic"),
+    "coffeemug": ("contactdb_objects/coffeemug.stl", "ceramic"),
+    "hammer": ("contactdb_objects/hammer.stl", "steel"),
+}
+"""Meshes in metres below the data folder, and a material."""
+
+Row = tuple[float, float, float]
+"""Median, low and high end of the interval: logarithm over the true size, in %."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--first-seed", type=int, default=3000)
+    parser.add_argument("--recordings", type=Path, default=None)
+    options = parser.parse_args()
+    data, station = find_shared_data(), load_station(station_path("mock"))
+    if data is None:
+        raise SystemExit("the shared meshes are absent; set TOUCHSTONE_DATA to the folder that holds them")
+    rows: dict[str, list[Row]] = defaultdict(list)
+    for seed in range(options.first_seed, options.first_seed + options.seeds):
+        for name, (file, material) in MESHES.items():
+            scene = scene_from_options(str(data / "meshes" / file), material, "m")
+            found = answer_run(ScaleCell(name, "unplaced", seed, "yes"), scene, station, options.recordings)
+            for sense, row in found.items():
+                rows[sense].append(row)
+    for sense, found_rows in rows.items():
+        sys.stdout.write(f"{sense:8} {describe_rows(found_rows)}\n")
+
+
+def answer_run(
+    cell: ScaleCell, scene: SceneFile, station: Station, recordings: Path | None
+) -> dict[str, Row]:
+    """Perform one run, or read its recording, and answer it by each sense and by all.
+
+    Args:
+        cell: mesh, gap and seed.
+        scene: scene of the mesh.
+        station: mocked bench.
+        recordings: folder of the recordings; None to keep none.
+    """
+    tree = scene_of(scene, cell).model_dump(mode="json", by_alias=True)
+    tree["sensors"].update(sound=False)
+    silent = scene_from_json(tree, cell.name)
+    experiment = named("scale-estimation")
+    with closing(perform_in_process(experiment, cell, silent, station, recordings)) as case:
+        recording = case.run.recording
+        answering = ScaleAnswering(RunFiles(recording), Accuracy.default(KNOBS))
+        for record in recording.steps():
+            answering.read(record)
+        truth = read_truth(recording)
+        assert truth is not None
+        true = float(truth.differences["longest_side_m"])
+        answer = answering.answer()
+        found = {
+            sense: compare_with(one.belief, true)
+            for sense, one in answer.by_sense.items()
+            if not isinstance(one, FitRefused)
+        }
+        return {**found, "fused": compare_with(answer.fused, true)}
+
+
+def compare_with(belief: Belief, true: float) -> Row:
+    """Express the median and the interval of a density relative to the true size in m."""
+    median, low, high = 100.0 * np.log(np.array([belief.size, *belief.interval]) / true)
+    return float(median), float(low), float(high)
+
+
+def describe_rows(rows: list[Row]) -> str:
+    """Count the intervals that hold, and the misses on each side."""
+    medians, lows, highs = np.array(rows).T
+    small, large = int((highs < 0.0).sum()), int((lows > 0.0).sum())
+    return (
+        f"held {len(rows) - small - large} of {len(rows)}, {small} too small, {large} too large; error "
+        f"{medians.mean():+.2f} % on average, {np.abs(medians).mean():.2f} % absolute"
+    )
+
+
+if __name__ == "__main__":
+    main()
