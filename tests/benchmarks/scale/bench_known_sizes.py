@@ -1,8 +1,8 @@
-"""Sizes of known shapes on meshes that nothing was tuned on: how often the 90 % intervals hold, and on which side.
+"""Sizes of known shapes on unseen meshes: how often the 90 % intervals hold, and on which side they miss.
 
-Run as ``PYTHONPATH=. python tests/benchmarks/scale/bench_known_sizes.py --recordings FOLDER``: one look and ten
-contacts of each mesh and seed, 10 s a run; the recordings are kept and answered again by the next call. The
-meshes are read from TOUCHSTONE_DATA or ../shared/data.
+Run as ``PYTHONPATH=. python tests/benchmarks/scale/bench_known_sizes.py --recordings FOLDER``: one look and
+ten contacts of each mesh and seed, 10 s a run; the recordings are kept and answered again by the next call.
+The meshes are read from TOUCHSTONE_DATA or ../shared/data.
 """
 
 import argparse
