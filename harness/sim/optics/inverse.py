@@ -115,7 +115,9 @@ def invert_mean(frames: ByteArray, calibration: TactileCalibration) -> Inversion
         PictureRefused: the mean picture is not what the calibration was made of.
         CalibrationRefused: the calibration has only a table.
     """
-    return invert(checked_picture(mean_picture(frames), calibration).image[None], calibration)
+    return invert(
+        checked_picture(mean_picture(frames), calibration, allow_wide=True).image[None], calibration
+    )
 
 
 def heights_or_refusal(frames: ByteArray, calibration: TactileCalibration) -> tuple[FloatArray, str]:

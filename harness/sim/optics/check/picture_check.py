@@ -21,7 +21,7 @@ from harness.sim.optics.check.faults import (
     require_unclipped,
     require_whole,
 )
-from harness.sim.optics.check.light import MIN_EXPLAINED, LightMatch, match_light, matching_variant
+from harness.sim.optics.check.light import LightMatch, match_light, matching_variant
 from harness.sim.optics.check.slopes import SlopeFit, linear_shading, slope_fit, surface_residual
 from harness.sim.optics.check.turned import better_turned, without_drift
 from harness.sim.optics.poisson import free_heights
@@ -47,6 +47,12 @@ _CLEAR = 0.25
 
 _FAR_BETTER = 2.0
 """Times the blocks that agree in the same light, from which another one is used beside a wide contact."""
+
+_MOST_IN_DOUBT = 0.5
+"""Weight of the blocks that agree with another light, from which it may not be the colours of a contact."""
+
+_SAME_EXPOSURE = 0.1
+"""Share by which a wide contact may change the brightness of a picture; a face changes its colours more."""
 
 _SIMPLE = 3
 """Models of the light, without those that would follow what a contact does to its surroundings."""
@@ -108,7 +114,10 @@ class CheckedPicture:
 
 
 def checked_picture(
-    image: ByteArray, calibration: TactileCalibration, background: ByteArray | None = None
+    image: ByteArray,
+    calibration: TactileCalibration,
+    background: ByteArray | None = None,
+    allow_wide: bool = False,
 ) -> CheckedPicture:
     """Compare a picture with its resting picture and its calibration.
 
@@ -117,6 +126,8 @@ def checked_picture(
         calibration: of the gel.
         background: ``(rows, columns, 3)`` RGB of the untouched gel just before the press; None for the
             calibration's.
+        allow_wide: whether a contact that fills the view, which cannot be told from another white balance, is
+            read in the resting picture's light instead of being refused: for shapes, not for depths.
 
     Raises:
         DataRefused: pictures of another shape or type than the calibration's.
@@ -139,7 +150,9 @@ def checked_picture(
         require_unclipped(picture, calibration.background)
         require_whole(picture, calibration.background)
     rest_light = match_light(known, known) if background is None else _light_of_rest(rest, known)
-    light, agrees = _light_of_press(seen, rest)
+    light, agrees, doubt, refusal = _settled_light(
+        seen, rest, calibration, block, background is not None, allow_wide
+    )
     gain = light.gain(*image.shape[:2]) * rest_light.gain(*image.shape[:2])
     _require_gain(gain, light.offset + rest_light.offset)
     shown = np.clip(light.apply(rest), 0.0, 255.0)
@@ -147,23 +160,15 @@ def checked_picture(
     require_quiet(image, untouched)
     _require_colours(image, untouched, np.linalg.norm(seen - shown, axis=2) > _SURROUNDINGS, block)
     light_error = _light_error(light, _SURROUNDINGS if agrees else 3.0 * _CLOSE_AT_REST)
+    light_error = max(light_error, doubt)
     if len(calibration.smooth):
         _require_own_orientation(seen, shown, calibration, block)
-        change = light.apply(rest) - rest if agrees else seen - rest
-        size, relief = _tilt_like_change(change, rest, calibration, block)
-        stands_out = _stands_out(seen - shown)
-        if (size > 0.0 and (agrees or not stands_out)) or not (agrees or stands_out or background is None):
-            whole = max(size, float(np.linalg.norm(seen - rest, axis=2).mean()))
-            face = f" ({1e3 * relief:.1f} mm from its highest to its lowest point)" if relief > 0.0 else ""
-            raise PictureRefused(
-                f"the whole picture differs from the resting picture by {whole:.1f} grey levels, as "
-                f"another white balance or a face over the whole view{face} does: fix the white balance, "
-                "take a resting picture just before the press, and leave some of the gel free"
-            )
-        light_error = max(light_error, size / np.sqrt(3.0))
+        if refusal:
+            raise PictureRefused(refusal)
         coarse = light.gain(*rest.shape[:2]) * rest_light.gain(*rest.shape[:2])
         _require_press(without_drift(seen - shown) / coarse, calibration, block)
-    notes = _notes(light, rest_light, background is not None)
+    assumed = not agrees and light.name == "same" and doubt > 0.0
+    notes = _notes(light, rest_light, background is not None, assumed)
     if light.name == rest_light.name == "same":
         return CheckedPicture(image, untouched, read_only(np.ones(3)), light_error, agrees, notes)
     # The change is divided, over the calibration's own background: its noise is none of this picture's.
@@ -268,6 +273,44 @@ def _light_of_press(seen: FloatArray, rest: FloatArray) -> tuple[LightMatch, boo
     return (loose if change > _CLOSE_AT_REST else match_light(seen, rest, _CLOSE_AT_REST, 1)), False
 
 
+def _settled_light(
+    seen: FloatArray,
+    rest: FloatArray,
+    calibration: TactileCalibration,
+    block: int,
+    has_own_rest: bool,
+    allow_wide: bool,
+) -> tuple[LightMatch, bool, float, str]:
+    """Return the light to read a press in, whether it agrees closely, grey levels in doubt, and a refusal.
+
+    A face pressed over the whole view changes the colours much as another white balance does. Where most of
+    the view agrees closely with another light, the two cannot be told apart; where less does, the light of
+    the resting picture is the likelier one. The refusal is empty where the light can be told, or is assumed.
+    """
+    light, agrees = _light_of_press(seen, rest)
+    if not len(calibration.smooth):
+        return light, agrees, 0.0, ""
+    stands_out = _stands_out(seen - np.clip(light.apply(rest), 0.0, 255.0))
+    change = light.apply(rest) - rest if agrees else seen - rest
+    size, relief = _tilt_like_change(change, rest, calibration, block)
+    doubtful = size > 0.0 if agrees else not stands_out and (size > 0.0 or has_own_rest)
+    doubt = size / float(np.sqrt(3.0))
+    if not doubtful:
+        return light, agrees, doubt, ""
+    exposure = float(light.apply(rest).mean() / rest.mean())
+    is_same = abs(exposure - 1.0) < _SAME_EXPOSURE and (not agrees or light.explained < _MOST_IN_DOUBT)
+    if allow_wide and is_same:
+        return match_light(seen, rest, models=1), False, max(_UNKNOWN_LIGHT, doubt), ""
+    whole = max(size, float(np.linalg.norm(seen - rest, axis=2).mean()))
+    face = f" ({1e3 * relief:.1f} mm from its highest to its lowest point)" if relief > 0.0 else ""
+    refusal = (
+        f"the whole picture differs from the resting picture by {whole:.1f} grey levels, as "
+        f"another white balance or a face over the whole view{face} does: fix the white balance, "
+        "take a resting picture just before the press, and leave some of the gel free"
+    )
+    return light, agrees, doubt, refusal
+
+
 def _stands_out(change: FloatArray) -> bool:
     """Return whether a contact stands out from its surroundings, inside the picture more than at its edge."""
     touched = np.linalg.norm(change, axis=2) > _SURROUNDINGS
@@ -325,7 +368,9 @@ def _require_gain(gain: FloatArray, offset: FloatArray) -> None:
         )
 
 
-def _notes(light: LightMatch, rest_light: LightMatch, has_own_rest: bool) -> tuple[str, ...]:
+def _notes(
+    light: LightMatch, rest_light: LightMatch, has_own_rest: bool, is_assumed: bool
+) -> tuple[str, ...]:
     notes = []
     if rest_light.name != "same":
         notes.append(
@@ -337,11 +382,10 @@ def _notes(light: LightMatch, rest_light: LightMatch, has_own_rest: bool) -> tup
             f"the light changed between the resting picture and the press by {_in_words(light)}; the change "
             "was divided by the gain"
         )
-    if not light.is_known:
+    if is_assumed or not light.is_known:
         notes.append(
-            f"{light.explained:.0%} of the press agrees with the resting picture in any light (at least "
-            f"{MIN_EXPLAINED:.0%} is needed to compare their light): the contact fills the view or the light "
-            "is uneven; the same light is assumed"
+            f"{light.explained:.0%} of the press agrees with the resting picture, too little to compare "
+            "their light: the contact fills the view or the light is uneven; the same light is assumed"
         )
     if not has_own_rest:
         notes.append(

@@ -398,6 +398,19 @@ def test_a_tilted_plate_over_the_whole_view_is_refused(tilt: float, gain: float)
     assert "white balance" in _refused(_byte(gain * press.astype(np.float64)), rest)
 
 
+def test_a_wide_contact_is_read_in_the_same_light_where_its_shape_is_wanted_and_not_its_depth() -> None:
+    """A ball of 60 mm whose contact fills the view: no gel at rest is left to tell the light by."""
+    surface = _surface(radius=60e-3, depth=2.0e-3)
+    press, rest = _drawn(surface)
+    with pytest.raises(PictureRefused, match="over the whole view"):
+        checked_picture(press, BENCH, rest)
+    wide = checked_picture(press, BENCH, rest, allow_wide=True)
+    np.testing.assert_array_equal(wide.gain, np.ones(3))
+    assert any("the same light is assumed" in note for note in wide.notes)
+    with pytest.raises(PictureRefused, match="over the whole view"):
+        checked_picture(_byte(0.7 * press.astype(np.float64)), BENCH, rest, allow_wide=True)
+
+
 @pytest.mark.parametrize("radius", [100e-3, 200e-3])
 @pytest.mark.parametrize("gain", [1.0, 1.02, 0.9])
 def test_a_flat_contact_over_the_whole_view_is_refused_or_within_its_deviation(
