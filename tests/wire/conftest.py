@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from tests.support.idle_computer import idle_computer as idle_computer
 from tests.support.ur_process import HOME, PLANE, UrProcess, wait_until
 
 

@@ -19,7 +19,7 @@ from harness.objectfile.surface_search import SurfaceSearch, require_own
 from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes, nodes_from
 from harness.objectfile.touch.pixels import pixel_queries
 from harness.objectfile.touch_entries import CodesEntry, GelEntry, TouchEntry
-from harness.sim.gel.gel import deform, require_within_gel
+from harness.sim.gel.gel import deform, over_range
 from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
 from harness.sim.gel.presses import Presses
 
@@ -83,10 +83,10 @@ class ReferenceMaps:
     gel: GelEntry
 
     def __call__(self, presses: Presses) -> AnyArray:
-        """Return ``(n, rows, columns)`` m; ``OutOfDomain`` for a press deeper than the gel is thick."""
+        """Return ``(n, rows, columns)`` m; parts beside the contact are held at the gel's thickness."""
         sensor = self.gel.sensor
         gap = height_maps(self.raster, inverse(presses.object_from_gel), sensor)
-        return deform(require_within_gel(penetration(gap, sensor), sensor), self.gel.skirt)
+        return deform(over_range(penetration(gap, sensor), sensor)[0], self.gel.skirt)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,7 @@ class ObjectTouch:
     def _require(self, presses: Presses) -> None:
         low, high, most = self._limits
         depths, tilts = presses.depths, presses.tilts
-        if ((depths < low * (1.0 - _EDGE)) | (depths > high * (1.0 + _EDGE))).any():
+        if ((depths < low - _EDGE * high) | (depths > high * (1.0 + _EDGE))).any():
             raise OutOfDomain(
                 f"a press {_span(depths * 1e3)} mm deep was asked of the "
                 f"touch's {self.level}, which knows {low * 1e3:g} to {high * 1e3:g} mm; press within that, "

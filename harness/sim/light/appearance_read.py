@@ -17,7 +17,7 @@ from harness.picture.texture import decode_texture
 from harness.sim.light.appearance import CREASE, NO_TEXTURE, Appearance, smooth_normals
 from harness.sim.solid.coordinates import move_near
 from harness.sim.solid.formats.obj_colours import read_obj_colours
-from harness.sim.solid.formats.parts import MeshFile, MeshPart, Picture, merge_parts
+from harness.sim.solid.formats.parts import MeshFile, MeshPart, TextureFile, merge_parts
 from harness.sim.solid.mesh_read import DECLARING, METRES, check_extent, choose_up_axis, unit_name
 
 GREY = 0.5
@@ -150,7 +150,7 @@ def _coloured(mesh: Mesh, read: MeshFile, crease: float) -> Appearance:
     )
 
 
-def _texture(picture: Picture, remarks: list[str]) -> ByteArray:
+def _texture(picture: TextureFile, remarks: list[str]) -> ByteArray:
     """A picture's pixels, sRGB."""
     pixels, is_transparent = decode_texture(picture.read(), picture.name)
     if is_transparent:

@@ -21,7 +21,7 @@ from harness.sim.solid.formats.parts import (
     Axis,
     MeshFile,
     MeshPart,
-    Picture,
+    TextureFile,
     require_placed,
     require_triangles,
     transform_part,
@@ -81,7 +81,7 @@ class _Material:
     """
 
     tint: FloatArray | None
-    picture: Picture | None
+    picture: TextureFile | None
     coordinates: str
 
 
@@ -435,7 +435,7 @@ class _Reader:
             return _Material(None, None, "")
         return _Material(None, self._picture(effect, texture.get("texture", "")), texture.get("texcoord", ""))
 
-    def _picture(self, effect: Any, sampler: str) -> Picture | None:
+    def _picture(self, effect: Any, sampler: str) -> TextureFile | None:
         """The picture of a texture: through a sampler and a surface, or by the image's id."""
         of = {each.get("sid"): each for each in effect.iter() if _name(each) == "newparam"}
         name = sampler
@@ -457,7 +457,7 @@ class _Reader:
         if found is None:
             self.colour_notes.append(f"the texture {address!r:.80} is not there: left out")
             return None
-        return Picture(address, partial(read_bounded, found, "a texture", MOST_DATA, MeshRefused))
+        return TextureFile(address, partial(read_bounded, found, "a texture", MOST_DATA, MeshRefused))
 
 
 _LINKS = ("source", "init_from", "instance_image")

@@ -25,7 +25,7 @@ from harness.sim.solid.formats.parts import (
     MAX_VERTICES,
     MeshFile,
     MeshPart,
-    Picture,
+    TextureFile,
     require_placed,
     require_triangles,
     transform_part,
@@ -555,7 +555,7 @@ class _Reader:
 
     def _texture(
         self, info: dict[str, Any], attributes: dict[str, Any], part: MeshPart
-    ) -> tuple[Picture | None, FloatArray | None]:
+    ) -> tuple[TextureFile | None, FloatArray | None]:
         transform = self.extension(info, _TRANSFORM) or {}
         number = self.count(transform.get("texCoord", info.get("texCoord", 0)), "texCoord")
         texture = self.entry("textures", info.get("index"), "a texture")
@@ -590,7 +590,7 @@ class _Reader:
         if any(sampler.get(key, _REPEAT) != _REPEAT for key in ("wrapS", "wrapT")):
             self.colour_notes.append("a texture that the file clamps or mirrors at its edge is repeated")
 
-    def _picture(self, texture: dict[str, Any]) -> Picture | None:
+    def _picture(self, texture: dict[str, Any]) -> TextureFile | None:
         webp = self.extension(texture, _WEBP)
         source = texture.get("source") if webp is None else webp.get("source")
         if source is None:
@@ -600,7 +600,7 @@ class _Reader:
         image = self.entry("images", source, "an image")
         if "bufferView" in image:
             view = image["bufferView"]
-            return Picture(f"image {source}", partial(self._view_bytes, view))
+            return TextureFile(f"image {source}", partial(self._view_bytes, view))
         uri = image.get("uri")
         if not isinstance(uri, str):
             raise self.refuse(f"image {source} has neither data nor an address")
@@ -608,7 +608,7 @@ class _Reader:
             self.colour_notes.append(f"the texture {uri!r} is not there: its material's colour is used")
             return None
         name = f"image {source}" if uri.startswith("data:") else uri
-        return Picture(name, partial(self._resource, uri, "an image"))
+        return TextureFile(name, partial(self._resource, uri, "an image"))
 
     def _view_bytes(self, view: Any) -> bytes:
         return self._view(view, "the buffer view of an image")[0]

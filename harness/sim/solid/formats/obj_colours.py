@@ -15,7 +15,7 @@ from harness.basics.files.foreign_file import MOST_DATA, MOST_JSON, read_bounded
 from harness.basics.files.referenced_file import referenced_path
 from harness.basics.files.text_file import read_text_bytes
 from harness.picture.srgb import PEAK, linear_from_srgb
-from harness.sim.solid.formats.parts import MeshFile, MeshPart, Picture, require_triangles
+from harness.sim.solid.formats.parts import MeshFile, MeshPart, TextureFile, require_triangles
 from harness.sim.solid.polygons import triangulated
 
 _NUMBERS = {"-o": 3, "-s": 3, "-t": 3, "-mm": 2}
@@ -42,7 +42,7 @@ class _Material:
     """
 
     tint: FloatArray | None = None
-    picture: Picture | None = None
+    picture: TextureFile | None = None
     scale: FloatArray = field(default_factory=lambda: np.ones(2))
     offset: FloatArray = field(default_factory=lambda: np.zeros(2))
     clamps: bool = False
@@ -231,7 +231,7 @@ def _set_texture(now: _Material, text: str, library: Path, of: Path, notes: list
             f"the texture {name!r} that {library.name} names is not there: {of.name} has no texture from it"
         )
         return
-    now.picture = Picture(name, partial(read_bounded, picture, "a texture", MOST_DATA, MeshRefused))
+    now.picture = TextureFile(name, partial(read_bounded, picture, "a texture", MOST_DATA, MeshRefused))
 
 
 def _split_options(text: str) -> tuple[dict[str, list[str]], str]:

@@ -25,7 +25,7 @@ MAX_NODES = 200_000
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class TextureFile:
     """An encoded picture that a file names.
 
     Attributes:
@@ -53,7 +53,7 @@ class MeshPart:
     faces: IntArray
     tints: FloatArray | None = None
     places: FloatArray | None = None
-    picture: Picture | None = None
+    picture: TextureFile | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -147,7 +147,7 @@ def test_a_budget_chooses_no_objectfile_where_the_scene_names_none() -> None:
 def test_an_option_names_it_beside_an_object_and_not_beside_a_scene(of: ObjectFile) -> None:
     options = SceneOptions(object="builtin:mug", objectfile=str(of.folder))
     assert resolve(options).object.objectfile == str(of.folder)
-    with pytest.raises(WrongUse, match="--objectfile belong to --object"):
+    with pytest.raises(WrongUse, match="--objectfile and --up-axis belong to --object"):
         resolve(replace(options, object=None, scene=Path("scenes/mug_both.toml")))
 
 

@@ -22,7 +22,7 @@ from tests.samples.synthetic_press import BASE_FROM_OBJECT, PRESSES
 from tests.support.localization import dials
 
 QUICK = dials(spacing=3e-3, samples=1000)
-UP = np.array([0.0, 0.0, -0.03])
+UP = np.array([0.0, 0.0, 1.0])
 TRUE = np.array([press.point for press in PRESSES])
 ALL = np.arange(len(PRESSES))
 

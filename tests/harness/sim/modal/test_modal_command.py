@@ -109,7 +109,7 @@ def test_a_built_in_object_is_its_own_file_and_of_its_own_material(
     ("words", "reason"),
     [
         (("builtin:mgu", "--material", "ceramic"), "no built-in object 'mgu'"),
-        (("builtin:mgu",), "--material, one of"),
+        (("builtin:mgu",), "did you mean 'mug'?"),
         (("builtin:mug", "--units", "mm"), "leave --units out"),
         (("builtin:mug", "--wall", "2mm"), "leave --wall out"),
     ],
