@@ -318,6 +318,8 @@ class MjpegStream:
         """Frames due before this one by the stream's rhythm; negative where late ones catch up."""
         times = [kept.time for kept in self._frames]
         period = _rhythm(times)
+        if period is None and self._stalled and len(times) >= _RHYTHM_FRAMES:
+            period = float(np.median(np.diff(times)))  # a stall is a loss, however uneven the stream is
         if period is None:
             if _varies(times):  # what was counted lately was the stream's own change of rate
                 self._missed -= sum(self._newly_missed)

@@ -298,8 +298,8 @@ def _settled_light(
     if not doubtful:
         return light, agrees, doubt, ""
     exposure = float(light.apply(rest).mean() / rest.mean())
-    is_same = abs(exposure - 1.0) < _SAME_EXPOSURE and (not agrees or light.explained < _MOST_IN_DOUBT)
-    if allow_wide and is_same:
+    is_little = size < _UNKNOWN_LIGHT or light.explained < _MOST_IN_DOUBT
+    if allow_wide and abs(exposure - 1.0) < _SAME_EXPOSURE and (is_little or not agrees):
         return match_light(seen, rest, models=1), False, max(_UNKNOWN_LIGHT, doubt), ""
     whole = max(size, float(np.linalg.norm(seen - rest, axis=2).mean()))
     face = f" ({1e3 * relief:.1f} mm from its highest to its lowest point)" if relief > 0.0 else ""

@@ -238,7 +238,11 @@ def test_a_normal_counts_for_less_where_the_surface_bends_within_a_contact() -> 
     across /= np.linalg.norm(across)
     bent = np.cos(lean)[:, None] * flat.mean_normal + np.sin(lean)[:, None] * across
     plane = np.repeat(flat.mean_normal[None], len(flat.points), axis=0)
-    seen = observe(replace(readings, touches=(replace(flat, normals=plane), replace(flat, normals=bent))))
+    away = np.array([0.02, 0.0, 0.0])  # at another place, so that both count
+    stand_from_gel = flat.stand_from_gel.copy()
+    stand_from_gel[:3, 3] += away
+    elsewhere = replace(flat, normals=bent, points=flat.points + away, stand_from_gel=stand_from_gel)
+    seen = observe(replace(readings, touches=(replace(flat, normals=plane), elsewhere)))
     np.testing.assert_allclose(seen.normals[0], seen.normals[1], atol=1e-9)
     at_plane, at_rim = seen.normal_sigma
     assert at_plane == pytest.approx(np.hypot(flat.normal_sigma, np.radians(6.0)), rel=1e-6)
