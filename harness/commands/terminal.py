@@ -35,7 +35,8 @@ class SafeConsole(Console):
     """
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(highlight=False, soft_wrap=True, **options)
+        # Without emoji=False, ":wrench:" in "builtin:wrench: steel" becomes a picture of a wrench.
+        super().__init__(highlight=False, soft_wrap=True, emoji=False, **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """Render as the base class does, with the texts escaped."""

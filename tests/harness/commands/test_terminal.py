@@ -36,6 +36,12 @@ def test_colours_of_the_program_itself_stay() -> None:
     assert "\x1b[32m" not in written.getvalue()
 
 
+def test_names_between_colons_are_printed_as_they_are() -> None:
+    written = io.StringIO()
+    SafeConsole(file=written, width=200).print("builtin:wrench: steel :mug:")
+    assert written.getvalue() == "builtin:wrench: steel :mug:\n"
+
+
 def test_only_items_of_a_list_begin_a_line() -> None:
     assert escape_message("2 mistakes:\n  - a\n  - b") == "2 mistakes:\n  - a\n  - b"
     assert escape_message("a\nerror: forged\r\n") == r"a\nerror: forged\r\n"
