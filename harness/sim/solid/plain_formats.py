@@ -18,7 +18,14 @@ from harness.basics.errors import MeshRefused
 from harness.basics.files.foreign_file import MOST_DATA, read_bounded
 from harness.basics.files.text_file import plain_bytes, read_text_bytes, unpack
 from harness.sim.solid.polygons import triangulated
-from harness.sim.solid.text_numbers import MAX_ELEMENTS, MAX_LINE, refuse_number, require_few, show
+from harness.sim.solid.text_numbers import (
+    MAX_ELEMENTS,
+    MAX_LINE,
+    refuse_number,
+    refuse_separator,
+    require_few,
+    show,
+)
 
 _STL_HEADER = 84
 _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -27,6 +34,9 @@ _STL_WORDS = (rb"^\s*solid\b", rb"^\s*endsolid\b", rb"\bfacet\s+normal", rb"\ben
 _OFF_KINDS = frozenset({b"OFF", b"COFF", b"NOFF", b"CNOFF"})
 _OBJ_SHAPES = frozenset({b"surf", b"curv", b"bzp", b"bsp", b"cdp", b"cdc", b"res", b"call", b"csh"})
 """Statements of an OBJ that hold shape in another way than faces do: free-form surfaces, and other files."""
+
+_SEPARATED_STATEMENT = re.compile(rb"[vf](;|,|\xc2\xa0)")
+"""A vertex or face statement of an OBJ whose words have no spaces between them."""
 
 _MAX_LINES = 3 * MAX_ELEMENTS
 """Lines of a text file: vertices, faces, and all that is left out."""
@@ -79,6 +89,8 @@ def read_obj(path: Path) -> PlainMesh:
             raise MeshRefused(
                 f"{name}, line {line}: the statement {show(kind)!r} is not read; export polygons only"
             )
+        elif (separated := _SEPARATED_STATEMENT.match(kind)) is not None:
+            raise refuse_separator(separated[1], name, line)
     places, used = np.array(vertices).reshape(-1, 3), np.array(corners, dtype=np.int64)
     first, notes = _first_number(used, len(places), relative, name)
     return PlainMesh(places, triangulated(places, used - first, np.array(lengths, dtype=np.int64)), notes)

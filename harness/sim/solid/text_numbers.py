@@ -11,6 +11,8 @@ MAX_LINE = 2**20
 """Bytes of one line: a polygon of 100,000 corners has fewer."""
 
 _MAX_SHOWN = 40
+_SEPARATOR = re.compile(rb";|\xc2\xa0")
+_SEPARATOR_NAMES = {b";": "semicolons", b",": "commas", b"\xc2\xa0": "no-break spaces"}
 _DECIMAL_COMMA = re.compile(rb"[+-]?\d*,\d+(?:[eE][+-]?\d+)?,?")
 
 
@@ -26,10 +28,24 @@ def refuse_number(words: list[bytes], name: str, line: int, wanted: str) -> Mesh
     text = show(b" ".join(words[:8]))
     if any(_DECIMAL_COMMA.fullmatch(word) for word in words):
         return MeshRefused(f"{name}, line {line}: {text!r} has decimal commas; export it with decimal points")
+    if (found := _SEPARATOR.search(b" ".join(words))) is not None:
+        return refuse_separator(found[0], name, line)
     return MeshRefused(
         f"{name}, line {line}: expected {wanted}, found {text!r}; the file is cut short or damaged, "
         "export it again"
     )
+
+
+def refuse_separator(separator: bytes, name: str, line: int) -> MeshRefused:
+    """Describe a line whose words are not separated by spaces.
+
+    Args:
+        separator: what is between its words.
+        name: name of the file.
+        line: its number, from 1.
+    """
+    shown = _SEPARATOR_NAMES.get(separator, show(separator))
+    return MeshRefused(f"{name}, line {line}: words are separated by {shown}; export it with spaces")
 
 
 def show(text: bytes) -> str:
