@@ -125,6 +125,12 @@ def depth(
             "the thickness of the gel is not known, and the depth is not compared with it: the calibration "
             f"is of {known.header.sensor!r}; give --sensor"
         )
+    elif sensor is not None and (own := _sensor_named_by(known)) is not None and own.name != gel.name:
+        answer["notes"].append(
+            f"the calibration is of {own.name!r} and --sensor is {gel.name!r}, "
+            f"{1e3 * gel.gel_thickness:g} mm thick: the depth is right only if this gel has the calibration's "
+            "colours and pixels"
+        )
     files = {"out": out, "picture": picture, "height_out": height_out}
     answer |= {name: None if path is None else str(path) for name, path in files.items()}
     answer["images"] = [str(path) for path in images]

@@ -9,7 +9,11 @@ from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import DataRefused, PictureRefused
 from harness.basics.geometry import apply
 from harness.picture.square_pixels import aspect_stated, made_square
-from harness.sim.optics.check.picture_check import checked_picture, require_within_gel
+from harness.sim.optics.check.picture_check import (
+    checked_picture,
+    require_one_press,
+    require_within_gel,
+)
 from harness.sim.optics.contact_depth import TOUCHED, Depth, read_depth
 from harness.sim.optics.inverse import DRIFTING, Detection, Inversion, mean_picture
 from harness.sim.optics.inverse_error import USUAL, height_errors
@@ -107,6 +111,7 @@ def read_press(
         CalibrationRefused: a calibration with no smooth model, or a table of too few bins.
     """
     _check(frames, background, calibration)
+    require_one_press(frames)
     aspect = aspect_stated(calibration.header.made_from)
     mean = mean_picture(made_square(frames, aspect))
     rest = None if background is None else made_square(background, aspect)
@@ -157,12 +162,20 @@ def _level_error(read: Inversion, agrees: bool, thickness: float | None) -> Floa
     return np.asarray(_SURROUNDINGS * deepest * np.minimum(1.0, height / (TOUCHED * deepest)))
 
 
+def _describe(frames: ByteArray) -> str:
+    """Return the size of pictures in words; the array's type and shape where they are no colour pictures."""
+    if frames.ndim == 4 and frames.dtype == np.uint8 and frames.shape[3] == 3:
+        return f"{len(frames)} of {frames.shape[2]} x {frames.shape[1]} pixels"
+    return f"{frames.dtype} {frames.shape}"
+
+
 def _check(frames: ByteArray, background: ByteArray | None, calibration: TactileCalibration) -> None:
     wanted = calibration.background.shape
     if frames.ndim != 4 or len(frames) == 0 or frames.dtype != np.uint8 or frames.shape[1:] != wanted:
         raise DataRefused(
-            f"the frames are {frames.dtype} {frames.shape}; this calibration reads uint8 (n, *{wanted}), at "
-            "least one: give the camera's own pictures, not cropped or scaled"
+            f"the frames are {_describe(frames)}; this calibration reads at least one of "
+            f"{wanted[1]} x {wanted[0]} pixels in 8-bit colour: give the camera's own pictures, not cropped "
+            "or scaled"
         )
     if background is not None and background.shape != wanted:
         raise DataRefused(

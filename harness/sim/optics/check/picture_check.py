@@ -42,6 +42,12 @@ _CLOSE_AT_REST = 6.0
 _MIN_EXPLAINED_AT_REST = 0.4
 """Weight of the blocks of a resting picture that have to agree with the calibration's in some light."""
 
+_SAME_PRESS = 16.0
+"""Grey levels, length over the channels, within which a block is the same in two frames of one press."""
+
+_MAX_CHANGED = 0.01
+"""Share of blocks that may differ between two frames of one press, e.g. where a marker moves."""
+
 _CLEAR = 0.25
 """Weight of the blocks from which the light is compared closely."""
 
@@ -232,6 +238,29 @@ def require_within_gel(height: FloatArray, sigma: FloatArray, thickness: float) 
         )
 
 
+def require_one_press(frames: ByteArray) -> None:
+    """Refuse frames that show different presses: the depth of their mean is that of none of them.
+
+    Args:
+        frames: ``(n, rows, columns, 3)`` RGB of one sensor.
+
+    Raises:
+        PictureRefused: a frame differs from the first by more than its light.
+    """
+    block = max(1, max(frames.shape[1:3]) // _BLOCKS)
+    first = block_means(frames[0], block)
+    for number, frame in enumerate(frames[1:], 2):
+        seen = block_means(frame, block)
+        shown = np.clip(match_light(seen, first).apply(first), 0.0, 255.0)
+        changed = float((np.linalg.norm(seen - shown, axis=2) > _SAME_PRESS).mean())
+        if changed > _MAX_CHANGED:
+            raise PictureRefused(
+                f"frame {number} of {len(frames)} differs from the first in {changed:.0%} of its area (at "
+                f"most {_MAX_CHANGED:.0%}) by more than its light: give the frames of one press that was "
+                "held still"
+            )
+
+
 @lru_cache(maxsize=8)
 def _rest(calibration: TactileCalibration, block: int) -> FloatArray:
     return read_only(block_means(calibration.background, block))
@@ -247,8 +276,8 @@ def _light_of_rest(rest: FloatArray, known: FloatArray) -> LightMatch:
     words, other = matching_variant(rest, known, _CLOSE_AT_REST)
     if words and other.explained > light.explained + _VARIANT_BETTER:
         raise PictureRefused(
-            f"the resting picture is the calibration's with {words}: give pictures in the camera's own "
-            "channel order and orientation, as the calibration's presses were"
+            f"the resting picture fits the calibration's only with {words}: give pictures in the camera's "
+            "own channel order and orientation, as the calibration's presses were"
         )
     raise PictureRefused(
         f"the resting picture differs from the calibration's in {1.0 - light.explained:.0%} of its area (at "
@@ -374,13 +403,13 @@ def _notes(
     notes = []
     if rest_light.name != "same":
         notes.append(
-            f"the light of the resting picture is that of the calibration by {_in_words(rest_light)}; the "
-            "change was divided by the gain"
+            f"the light of the resting picture differs from the calibration's by {_in_words(rest_light)}; "
+            "the reading is corrected for it"
         )
     if light.name != "same":
         notes.append(
-            f"the light changed between the resting picture and the press by {_in_words(light)}; the change "
-            "was divided by the gain"
+            f"the light changed between the resting picture and the press by {_in_words(light)}; the "
+            "reading is corrected for it"
         )
     if is_assumed or not light.is_known:
         notes.append(

@@ -151,7 +151,25 @@ def test_the_thickness_is_that_of_the_sensor_and_not_of_one_with_the_same_pixels
     thin = tmp_path / "thin.toml"
     thin.write_text(text.replace('"2.5 mm"', '"0.6 mm"'))
     assert "in a gel of 0.60 mm" in _answered(capsys, *words, "--sensor", thin, code=1)["error"]
-    assert _answered(capsys, *words, "--sensor", "gelsight-mini")["sensor"]["name"] == "GelSight Mini"
+    other = _answered(capsys, *words, "--sensor", "gelsight-mini")
+    assert other["sensor"]["name"] == "GelSight Mini"
+
+
+def test_a_calibration_of_another_shipped_sensor_is_noted(capsys: pytest.CaptureFixture[str]) -> None:
+    words = (LIGHT / "press.png", "--background", LIGHT / "rest.png", "--calibration", NAME, "--sensor")
+    note = "--sensor is 'GelSight Mini', "
+    assert any(note in each for each in _answered(capsys, *words, "gelsight-mini")["notes"])
+    assert not any("--sensor is" in each for each in _answered(capsys, *words, "gelsight-r1.5")["notes"])
+
+
+def test_frames_of_two_presses_are_refused_and_one_press_in_two_lights_is_read(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = ("--background", LIGHT / "rest.png", "--calibration", NAME)
+    error = _answered(capsys, LIGHT / "press.png", LIGHT / "rest.png", *words, code=1)["error"]
+    assert "frame 2 of 2 differs from the first" in error
+    answer = _answered(capsys, LIGHT / "press.png", LIGHT / "press_dim.png", *words)
+    assert answer["deepest_m"] == pytest.approx(0.599e-3, abs=0.05e-3)
 
 
 def test_a_missing_output_folder_is_named_before_the_pictures_are_read(

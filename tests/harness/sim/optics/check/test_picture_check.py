@@ -166,7 +166,7 @@ def test_another_white_balance_is_corrected(gains: tuple[float, float, float]) -
     for background in (rest, None):
         checked = checked_picture(press, BENCH, background)
         assert np.abs(checked.gain / gains - 1.0).max() < 0.05
-        assert "divided" in checked.notes[0]
+        assert "corrected for it" in checked.notes[0]
     assert _scores(press, rest) < 2.0
 
 
