@@ -128,8 +128,8 @@ def depth(
     elif sensor is not None and (own := _sensor_named_by(known)) is not None and own.name != gel.name:
         answer["notes"].append(
             f"the calibration is of {own.name!r} and --sensor is {gel.name!r}, "
-            f"{1e3 * gel.gel_thickness:g} mm thick: the depth is right only if this gel has the calibration's "
-            "colours and pixels"
+            f"{1e3 * gel.gel_thickness:g} mm thick: the depth is right only if this gel has the "
+            "calibration's colours and pixels"
         )
     files = {"out": out, "picture": picture, "height_out": height_out}
     answer |= {name: None if path is None else str(path) for name, path in files.items()}
