@@ -136,7 +136,8 @@ def _asked(
     known = set() if section is None else set(section.model_fields)
     for key in asked:
         if key not in known:
-            raise WrongUse(f"--{key}: the experiment's table has no {key!r}; {nearest(key, known)}")
+            option = f"--{key}" if keys.get(key) is not None else f"--set {key}"
+            raise WrongUse(f"{option}: this experiment has no setting {key!r}; {nearest(key, known)}")
     return asked
 
 

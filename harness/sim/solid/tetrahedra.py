@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import MeshRefused, WrongUse
-from harness.basics.mesh import Mesh
+from harness.basics.mesh import Mesh, signed_volume
 from harness.objects.solid import from_manifold, to_manifold
 from harness.sim.solid.mesh_repair import boundary_edges
 from harness.sim.solid.modal_mesh import FACES, boundary_faces
@@ -28,6 +28,9 @@ _ENVELOPE_OF_EDGE = 0.03
 FLATTEST = 1e-8
 """Least volume of a cell as a share of its edges' root mean square cubed: below it, stiffness
 grows so large that the eigenvalues lose their digits."""
+
+_MAX_CELLS = 5_000_000
+"""Cells of one object: more exceed the memory of usual computers."""
 
 _SLIT = 1e-6
 """Of the surface's area, what may be open: an edge along which a face without area was left out."""
@@ -136,6 +139,7 @@ def tetrahedralize(
             f"an element edge of {edge * 1e3:g} mm is outside 0 to {mesh.diagonal * 1e3:.4g} mm, the "
             "diagonal of the object; say one in between"
         )
+    _require_few_cells(mesh, edge)
     wall = thin_wall(mesh)
     if envelope is None:
         envelope = min(ENVELOPE_OF_WALL * wall, _ENVELOPE_OF_EDGE * edge, _ENVELOPE_OF_SIZE * mesh.diagonal)
@@ -186,6 +190,21 @@ def _simplified(mesh: Mesh, tolerance: float) -> Mesh:
         return mesh
     fewer = from_manifold(solid.simplify(tolerance / _MM))
     return Mesh(fewer.vertices * _MM + mesh.vertices[0], fewer.faces)
+
+
+def _require_few_cells(mesh: Mesh, edge: float) -> None:
+    """Refuse an edge that fills the mesh with more cells than memory and time allow.
+
+    Raises:
+        WrongUse: regular tetrahedra of this edge, which are fewer than the real ones, exceed the limit.
+    """
+    count = abs(signed_volume(mesh)) * 6.0 * np.sqrt(2.0) / edge**3
+    if count > _MAX_CELLS:
+        shortest = 1.01 * edge * np.cbrt(count / _MAX_CELLS)
+        raise WrongUse(
+            f"an element edge of {edge * 1e3:g} mm needs about {count:.2g} elements; at most {_MAX_CELLS:,} "
+            f"are made: give an edge of at least {shortest * 1e3:.3g} mm"
+        )
 
 
 def signed_volumes(nodes: FloatArray, cells: IntArray) -> FloatArray:

@@ -147,6 +147,14 @@ FOLDERS = (
 )
 
 
+def test_an_unknown_setting_is_named_by_the_option_that_gave_it(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["run", "contact-localization", "--object", "builtin:mug"]
+    assert invoke([*words, "--set", "nosuch=1"]) == 2
+    assert "error: --set nosuch: this experiment has no setting" in capsys.readouterr().err
+    assert invoke([*words, "--presses", "3"]) == 2
+    assert "error: --presses: this experiment has no setting" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("words", OUTPUTS)
 def test_a_missing_output_folder_is_named_before_anything_is_computed(
     words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -149,6 +149,13 @@ def test_an_envelope_that_closes_a_wall_up_is_refused(reach: float) -> None:
             modes_of_file("builtin:plate", CERAMIC, count=3, edge=edge, envelope=reach)
 
 
+def test_an_edge_that_needs_too_many_elements_is_refused_with_the_shortest() -> None:
+    with pytest.raises(WrongUse, match="elements; at most 5,000,000 are made") as refused:
+        tetrahedralize(sphere(0.03), 1e-6)
+    # A ball of 113.1 cm^3 holds 5,000,000 regular tetrahedra of 0.577 mm.
+    assert 0.57 < float(str(refused.value).split()[-2]) < 0.59
+
+
 def test_the_default_edge_follows_the_wave() -> None:
     solid = sphere(0.03)
     low, high = (default_edge(shell(0.1, 2e-3), CERAMIC, limit) for limit in (5e3, 20e3))
