@@ -23,7 +23,7 @@ from harness.effects.force_effects import FORCE_EFFECT
 from harness.effects.sound_effects import SOUND_EFFECTS
 from harness.effects.touch_drawing import optics, reached
 from harness.effects.touch_file_effects import FILE_EFFECTS, SHAPES, gel_from
-from harness.sim.gel.gel import deform, require_within_gel
+from harness.sim.gel.gel import deform, over_range
 from harness.sim.gel.height_map import RasterMesh
 from harness.sim.gel.markers import draw_markers, marker_displacements
 from harness.sim.optics.noise import with_camera_noise
@@ -49,7 +49,9 @@ def _height_map(given: Given, levels: Levels) -> FloatArray:
 
 
 def _gel(given: Given, levels: Levels) -> FloatArray:
-    pressed = require_within_gel(given["touch.height_map"], given["sensor"])
+    # Estimated contacts are simulated too: what reaches deeper than the gel is held at its thickness here;
+    # ``touch_press`` refuses such a press where a user requests it.
+    pressed, _ = over_range(given["touch.height_map"], given["sensor"])
     skirt = given["sensor.calibration"].header.skirt
     return deform(pressed, skirt, "fast" if levels[GEL.name] == "fast" else "exact")
 
@@ -80,7 +82,7 @@ def _shadow_out_of_table(given: Given, _levels: Levels) -> FloatArray:
 
 
 def _marker_motion(given: Given, levels: Levels) -> FloatArray:
-    pressed = require_within_gel(given["touch.height_map"], given["sensor"])
+    pressed, _ = over_range(given["touch.height_map"], given["sensor"])
     return marker_displacements(pressed, given["sensor"], float(levels[MARKER_NODES.name]))
 
 

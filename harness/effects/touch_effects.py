@@ -14,7 +14,7 @@ from harness.effects.accuracy import Level
 from harness.effects.catalogue import EFFECTS, MARKER_NODES, OPTICS, SUPERSAMPLING
 from harness.effects.effect import Effect
 from harness.effects.touch_drawing import optics, reached
-from harness.sim.gel.gel import require_within_gel
+from harness.sim.gel.gel import over_range
 from harness.sim.gel.markers import draw_markers, marker_displacements
 from harness.sim.optics.optics import TactileImages
 from harness.sim.optics.shadow_image import darkening
@@ -106,7 +106,7 @@ def _darkening(given: Given, _levels: Levels) -> tuple[Float32Array, FloatArray]
 def _marker_motion(given: Given, levels: Levels) -> FloatArray:
     """As the catalogue's, of dots that were measured."""
     sensor, dots = given["sensor"], given[DOTS]
-    pressed = require_within_gel(given["touch.height_map"], sensor)
+    pressed, _ = over_range(given["touch.height_map"], sensor)
     return marker_displacements(pressed, sensor, float(levels[MARKER_NODES.name]), dots.in_gel(sensor.pitch))
 
 

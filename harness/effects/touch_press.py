@@ -219,12 +219,12 @@ def _pressed(
         "sensor.elastic": gel.elastic,
         "sensor.forces": gel.forces,
     }
-    for name in ("touch.height_map", "touch.gel"):
-        if name in given:
-            require_within_gel(given[name], gel.sensor)
     sources |= {"object.wall": scene.object.wall, **_file(made, scene)}
     done = evaluate(made, {**sources, **given})
     values = replace(done, values={**given, **done.values})
+    for name in ("touch.height_map", "touch.gel"):
+        if name in values.values:
+            require_within_gel(values.values[name], gel.sensor)
     seen: Heights = of if "touch.height_map" in values.values else "gel"
     heights = values["touch.gel" if seen == "gel" else "touch.height_map"][0]
     return Press(gel, made, values, contact_of(heights, gel.calibration, seen), seen)

@@ -5,7 +5,7 @@ import numpy as np
 
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
 from harness.bench.sensor import TactileSensor
-from harness.sim.gel.gel import require_within_gel
+from harness.sim.gel.gel import over_range
 from harness.sim.gel.height_map import rest_surface
 from harness.sim.optics.shadow import RIM, ShadowTable, cast_shadows, rim
 from harness.sim.optics.shadow_kernels import CHANNELS, lay_over, take, throw
@@ -42,7 +42,7 @@ def darkening(
         ``(n, rows, columns, 3)`` grey levels, 0 or more, and ``(n,)`` the share of each contact's rim
         whose depth was not in the table.
     """
-    held = require_within_gel(penetration, sensor)
+    held, _ = over_range(penetration, sensor)
     deepest = held.max(axis=(1, 2), keepdims=True)
     core = (held > calibration.header.skirt.core * deepest) & (held > 0.0)
     untouched = -rest_surface(sensor) if rest is None else rest

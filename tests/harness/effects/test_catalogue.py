@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.basics.errors import OutOfDomain, WrongUse
+from harness.basics.errors import WrongUse
 from harness.basics.geometry import inverse, transform
 from harness.basics.mesh import Mesh
 from harness.bench.scene import Light, Room, SceneFile, Sensors, scene_from_options
@@ -137,9 +137,13 @@ def test_a_finer_supersampling_converges(mug: Mesh, calibration: TactileCalibrat
     assert 0.0 < errors[1] < errors[0] < 1e-5
 
 
-def test_a_press_deeper_than_the_gel_is_refused(mug: Mesh, calibration: TactileCalibration) -> None:
-    with pytest.raises(OutOfDomain, match=r"this gel is 2\.5 mm thick"):
-        evaluate(scene_plan(SCENE, GELSIGHT_R15), sources(mug, calibration, 1e-3, 4e-3))
+def test_an_estimated_contact_is_held_at_the_gel_s_thickness(
+    mug: Mesh, calibration: TactileCalibration
+) -> None:
+    """Presses that a user requests are refused: ``tests/harness/commands/press`` and ``test_api``."""
+    done = evaluate(scene_plan(SCENE, GELSIGHT_R15), sources(mug, calibration, 1e-3, 4e-3))
+    assert done["touch.height_map"][1].max() > GELSIGHT_R15.gel_thickness
+    assert done["touch.gel"].max() <= GELSIGHT_R15.gel_thickness
 
 
 def test_noise_runs_only_where_it_is_asked_for(mug: Mesh, calibration: TactileCalibration) -> None:

@@ -204,7 +204,7 @@ def test_a_contact_that_fills_the_window_is_said(tmp_path: Path, capsys: pytest.
         (("builtin:mug", "--contact", "0", "0", "0.5"), "off the surface", 1),
         (("builtin:mug", "--contact", "-40", "0", "50"), "write metres", 1),
         (("builtin:mug", "--contact", "0.04", "0", "0.05"), "in the sensor's way", 1),
-        (("builtin:mug", "--contact", "0.04", "0", "0.05", "--force"), "in the sensor's way", 1),
+        (("builtin:mug", "--contact", "0.04", "0", "0.05", "--force"), "the gel 2.5 mm thick", 1),
         (("builtin:mgu", "--contact", "0", "0", "0"), "did you mean 'mug'", 2),
         (("none.obj", "--contact", "0", "0", "0"), "none.obj", 2),
         (("builtin:mug", "--contact", "-0.04", "0", "0.05", "--depth", "1"), "no unit", 2),

@@ -100,7 +100,7 @@ def test_a_table_of_measured_forces_is_read_where_it_is_given(
         (["--force", "--gel-poisson", "0.6"], "0 to 0.5"),
         (["--force", "--level", "touch.force=hertz"], "touch.force has no level 'hertz'"),
         (["--force", "--level", "touch.force=table"], "--force-table"),
-        (["--force", "--thickness", "0.4mm"], "this gel is 0.4 mm thick"),
+        (["--force", "--thickness", "0.4mm"], "the gel 0.4 mm thick"),
         (["--force", "--force-table", "none.json"], "none.json cannot be read: no such file"),
     ],
 )
