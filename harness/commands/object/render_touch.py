@@ -152,22 +152,25 @@ def _rendered(
 ) -> RenderedPress:
     from harness.objectfile.file import ObjectFile
     from harness.objectfile.touch.level import require_gel
-    from harness.objectfile.touch.touch import open_touch
+    from harness.objectfile.touch.touch import ReferenceMaps, open_touch
+    from harness.sim.gel.presses import Presses
 
     begun = time.perf_counter()
     of = ObjectFile.open(folder)
-    touch = open_touch(of, level)
+    touch, exact = open_touch(of, level), open_touch(of, "reference")
     require_gel(of, touch.entry.gel, by.gel.sensor, by.gel.calibration.header.skirt)
     place = places.pressed_place(of.mesh, contact, vertex)
     # The first press makes ready what all that follow use.
     _pressed(of, touch, place, by)
+    assert isinstance(exact.maps, ReferenceMaps)
+    exact.maps.require_clear(Presses.one(place.point, place.normal, *by.pose))
     loaded, begun = time.perf_counter() - begun, time.perf_counter()
     press = _pressed(of, touch, place, by)
     seconds = {"load": loaded, "render": time.perf_counter() - begun}
     if level == "reference":
         return RenderedPress(of, touch, place, by.pose, press, None, seconds)
     begun = time.perf_counter()
-    reference = _pressed(of, open_touch(of, "reference"), place, by)
+    reference = _pressed(of, exact, place, by)
     seconds["reference"] = time.perf_counter() - begun
     return RenderedPress(of, touch, place, by.pose, press, reference, seconds)
 

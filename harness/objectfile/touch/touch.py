@@ -19,7 +19,7 @@ from harness.objectfile.surface_search import SurfaceSearch, require_own
 from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes, nodes_from
 from harness.objectfile.touch.pixels import pixel_queries
 from harness.objectfile.touch_entries import CodesEntry, GelEntry, TouchEntry
-from harness.sim.gel.gel import deform, over_range
+from harness.sim.gel.gel import deform, over_range, require_within_gel
 from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
 from harness.sim.gel.presses import Presses
 
@@ -84,9 +84,15 @@ class ReferenceMaps:
 
     def __call__(self, presses: Presses) -> AnyArray:
         """Return ``(n, rows, columns)`` m; parts beside the contact are held at the gel's thickness."""
-        sensor = self.gel.sensor
-        gap = height_maps(self.raster, inverse(presses.object_from_gel), sensor)
-        return deform(over_range(penetration(gap, sensor), sensor)[0], self.gel.skirt)
+        return deform(over_range(self._penetration(presses), self.gel.sensor)[0], self.gel.skirt)
+
+    def require_clear(self, presses: Presses) -> None:
+        """Raise ``OutOfDomain`` where a part of the object reaches deeper than the gel is thick."""
+        require_within_gel(self._penetration(presses), self.gel.sensor)
+
+    def _penetration(self, presses: Presses) -> FloatArray:
+        gap = height_maps(self.raster, inverse(presses.object_from_gel), self.gel.sensor)
+        return penetration(gap, self.gel.sensor)
 
 
 @dataclass(frozen=True, eq=False)

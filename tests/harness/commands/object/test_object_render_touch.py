@@ -194,3 +194,14 @@ def test_an_object_without_a_touch_is_refused(tmp_path: Path, capsys: pytest.Cap
     egg = egg_file(tmp_path / "egg").folder
     error = rendered(egg, tmp_path, capsys, "--contact", "0", "0", "0.1", code=1)["error"]
     assert "has no touch; add it with `touchstone object build --only touch`" in error
+
+
+def test_a_place_at_which_another_part_reaches_through_the_gel_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Inside the mug the sensor's window meets the opposite wall."""
+    out = tmp_path / "press.png"
+    words = ["object", "render", "touch", "mug", "--vertex", "3000", "--depth", "2mm", "--out", str(out)]
+    assert invoke(words) == 1
+    assert "this gel is 2.5 mm thick" in capsys.readouterr().err
+    assert not out.exists()
