@@ -59,8 +59,9 @@ def begin(
         require_unused(folder)
     if scene.object.is_hidden and not procedure.sizes_unknown:
         raise WrongUse(
-            f'the scene says object.scale = "hidden", and {procedure.name} needs to know how large the '
-            "object is; give its scale, or find it first with touchstone run scale-estimation"
+            f"{procedure.name} needs to know how large the object is, and its size is unknown (--range, or "
+            'scale = "hidden" in the scene): give its scale, or find it first with touchstone run '
+            "scale-estimation"
         )
     mock = _mock(procedure, station, gap, bench)
     if procedure.observe is not None and scene.observe == SceneFile.model_fields["observe"].default:

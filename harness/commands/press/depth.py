@@ -105,9 +105,9 @@ def depth(
     )
     bench = None if station is None else load_station(station_path(station))
     gel = _sensor(sensor, bench)
-    wanted = depth_force.asked(force, thickness, gel_modulus, gel_modulus_error, gel_poisson, gel)
     known = _calibration(calibration, bench)
     gel = gel or _sensor_named_by(known)
+    wanted = depth_force.asked(force, thickness, gel_modulus, gel_modulus_error, gel_poisson, gel)
     rest = None if background is None else read_image(background)
     frames, thickness_known = _frames(images), None if gel is None else gel.gel_thickness
     with refusals_name(*images, *([] if background is None else [background])):

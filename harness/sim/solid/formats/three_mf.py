@@ -273,6 +273,8 @@ class _Model:
             self._begin_object(attributes)
         elif name == "component":
             self._mesh(name).components.append(self._reference(attributes))
+        elif name == "item" and self.is_root and attributes.get("printable", "1") in ("0", "false"):
+            self.reader.notes.append("items of the build that are not to be printed are left out")
         elif name == "item" and self.is_root:
             self.reader.items.append(self._reference(attributes))
         elif name == "basematerials":

@@ -47,6 +47,14 @@ def test_components_are_placed_by_their_own_transform_and_then_by_the_item_s(tmp
     assert part.vertices.max(axis=0) == pytest.approx([0.0, 50.0, 25.0])
 
 
+def test_an_item_that_is_not_to_be_printed_is_left_out_and_named(tmp_path: Path) -> None:
+    items = '<item objectid="1"/><item objectid="1" printable="0" transform="1 0 0 0 1 0 0 0 1 60 0 0"/>'
+    path = write_3mf(tmp_path / "box.3mf", model_xml(f'<object id="1">{mesh_xml()}</object>', items))
+    report = take_in(path, None).report
+    assert report.volume == pytest.approx(VOLUME, rel=1e-9)
+    assert any("not to be printed" in warning for warning in report.warnings)
+
+
 def test_what_the_build_does_not_place_is_no_object(tmp_path: Path) -> None:
     resources = f'<object id="1">{mesh_xml()}</object><object id="2">{mesh_xml()}</object>'
     path = write_3mf(tmp_path / "box.3mf", model_xml(resources, '<item objectid="2"/>'))
