@@ -100,6 +100,13 @@ def test_without_being_asked_there_is_no_force(capsys: pytest.CaptureFixture[str
     assert answer["seconds"]["force_cpu"] is None
 
 
+def test_the_sensor_that_a_calibration_names_gives_the_thickness(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    answer = _answered(capsys, tmp_path, _ball(5e-3, 0.3e-3), *WORDS[:3])
+    assert answer["force"]["thickness_m"] == THICK
+
+
 def test_a_bench_says_how_thick_its_gel_is(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     answer = _answered(capsys, tmp_path, _ball(5e-3, 0.3e-3), "--station", "mock", "--force")
     assert answer["force"]["thickness_m"] == THICK
@@ -109,7 +116,6 @@ def test_a_bench_says_how_thick_its_gel_is(capsys: pytest.CaptureFixture[str], t
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (WORDS[:3], "how thick the gel is"),
         ((*WORDS[:2], "--thickness", "2.5mm"), "add --force"),
         ((*WORDS[:4], "0mm"), "above zero"),
         ((*WORDS, "--gel-modulus", "0.3MPa"), "say both"),
