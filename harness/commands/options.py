@@ -193,7 +193,7 @@ RunFolder = Annotated[
 
 
 class BenchKind(StrEnum):
-    """How a mocked bench runs."""
+    """Kind of a mocked bench."""
 
     WIRES = "wires"
     IN_PROCESS = "in-process"

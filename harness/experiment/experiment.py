@@ -252,10 +252,10 @@ class ErrorBound:
     """m; every run of the scene states at least this."""
 
     reason: str
-    """What limits it, as the end of a sentence that begins with the error."""
+    """Cause of the limit, as the end of a sentence that begins with the error."""
 
     advice: str
-    """What lowers it, or what to do instead."""
+    """Advice: a change that lowers it, or an alternative."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

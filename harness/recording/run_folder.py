@@ -42,7 +42,7 @@ OBJECTFILE = "objectfile"
 _DESCRIBED = f"{OBJECTFILE}/{DESCRIPTION}"
 
 OWN_NAMES = (OBJECT, CALIBRATION, ACQUISITION, SENSOR, OBJECTFILE, STEPS, HEADER)
-"""What ``create_run`` may write into the folder of a run; nothing else there is ever replaced or removed."""
+"""Names that ``create_run`` may write into the folder of a run; nothing else there is ever replaced or removed."""
 
 _NUMBERS_COME_FROM = ("numpy", "scipy", "numba", "opencv-contrib-python-headless", "mujoco", "touchstone-lab")
 
@@ -236,7 +236,7 @@ class RunFiles:
 
     @property
     def context(self) -> RunContext:
-        """What a mocked bench needs to know of this run."""
+        """Inputs of a mocked bench for this run."""
         header = self.recording.header
         gap = (header.mock or {}).get("gap")
         return RunContext(self.recording.truth_path, self.mesh, header.seed, gap, header.run_id)

@@ -94,7 +94,7 @@ def further_contact(places: Sequence[FloatArray], symmetry: SymmetryGroup, mesh:
 
 
 def _is_ball(mesh: Mesh, tolerance: float) -> bool:
-    """Whether every rotation about its centre leaves the surface unchanged."""
+    """Check that every rotation about its centre leaves the surface unchanged."""
     radii = np.linalg.norm(mesh.vertices - 0.5 * mesh.bounds.sum(axis=0), axis=1)
     return bool(np.ptp(radii) < 2.0 * tolerance)
 

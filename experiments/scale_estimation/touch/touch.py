@@ -91,7 +91,7 @@ class Touch:
 
     @property
     def is_doubted(self) -> bool:
-        """Whether the contacts are a sign of another object."""
+        """True where the contacts are a sign of another object."""
         return self.places >= MIN_JUDGED_PLACES and self.cost > doubted_cost(self.places)
 
 

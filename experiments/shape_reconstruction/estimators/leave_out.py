@@ -17,7 +17,7 @@ _SAME_PLACE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """How the field predicts contacts that were left out.
+    """Predictions of left-out contacts by the field.
 
     Attributes:
         errors: ``(contacts,)`` rms distance of each from the field fitted without it, m; zero where thinning

@@ -40,7 +40,7 @@ _SILHOUETTE = 1.0e-3
 
 @dataclass(frozen=True, eq=False)
 class _Data:
-    """What contacts say of the field.
+    """Observations of the field by contacts.
 
     Attributes:
         points: ``(n, 3)`` m.

@@ -168,14 +168,14 @@ def _with_predictions(
 
 
 def _is_poor(found: Candidate) -> bool:
-    """Whether the shape fits contacts or outline poorly, or only on a bench that is off."""
+    """True where the shape fits contacts or outline poorly, or only on a bench that is off."""
     typical = found.estimate.details["contact_cost"]
     assert isinstance(typical, float)
     return typical > LOOSE or _strain_of(found) > STRAINED or found.outline_error > MAX_OUTLINE_ERROR
 
 
 def _is_undecided(found: Candidate) -> bool:
-    """Whether the readings fit two classes alike."""
+    """True where the readings fit two classes alike."""
     classes = found.estimate.details["classes"]
     assert isinstance(classes, Mapping)
     return bool(sum(weight >= RIVAL for weight in classes.values()) > 1)

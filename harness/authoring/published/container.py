@@ -102,7 +102,7 @@ def _reason(error: Exception) -> str:
 
 @dataclass
 class Budget:
-    """What a tree may still hold."""
+    """Remaining limits of a tree."""
 
     items: int = _MAX_ITEMS
     bytes: int = MOST_DATA

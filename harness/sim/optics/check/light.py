@@ -53,7 +53,7 @@ class LightMatch:
 
     @property
     def is_known(self) -> bool:
-        """Whether enough of the picture follows the light for a correction."""
+        """True where enough of the picture follows the light for a correction."""
         return self.explained >= MIN_EXPLAINED
 
     def gain(self, rows: int, columns: int) -> FloatArray:
