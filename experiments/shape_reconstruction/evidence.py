@@ -138,7 +138,7 @@ class ShapeEvidence:
 
     @property
     def repeated(self) -> int:
-        """Number of touches that repeat an earlier one at its place: a repeated reading is no new evidence."""
+        """Number of touches that repeat an earlier one at its place: no new evidence."""
         return len(self.touches) - len(self._by_place)
 
     @property

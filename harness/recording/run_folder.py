@@ -42,7 +42,7 @@ OBJECTFILE = "objectfile"
 _DESCRIBED = f"{OBJECTFILE}/{DESCRIPTION}"
 
 OWN_NAMES = (OBJECT, CALIBRATION, ACQUISITION, SENSOR, OBJECTFILE, STEPS, HEADER)
-"""Names that ``create_run`` may write into the folder of a run; nothing else there is ever replaced or removed."""
+"""Names that ``create_run`` may write into a run's folder; nothing else there is replaced or removed."""
 
 _NUMBERS_COME_FROM = ("numpy", "scipy", "numba", "opencv-contrib-python-headless", "mujoco", "touchstone-lab")
 
