@@ -74,7 +74,7 @@ _MAX_UNEXPLAINED, _MAX_RELIEF = 0.1, 3.5e-3
 contact within these changes the colours in the same way."""
 
 _MAX_CLIPPED = 0.1
-"""Fraction of the contact's values; real presses have 0.04. At 0.18 a depth of 0.6 mm is 0.04 mm too small."""
+"""Fraction of the contact's values; real presses have 0.04. At 0.18 a depth of 0.6 mm is 0.04 mm too low."""
 
 _VARIANT_BETTER = 0.15
 """Weight of the blocks that another channel order or orientation has to explain more, to be reported."""
