@@ -41,7 +41,7 @@ def test_every_scene_has_the_keys_that_are_set() -> None:
     for scene in found.values():
         stated = scene.section(section).model_dump()
         assert (stated["contacts"], stated["paper_networks"]) == (4, "some folder")
-    with pytest.raises(WrongUse, match="has no 'contcats'"):
+    with pytest.raises(WrongUse, match="no setting 'contcats'"):
         with_assignments(scenes, section, ["contcats=4"])
     with pytest.raises(WrongUse, match="no table in a scene"):
         with_assignments(scenes, None, ["contacts=4"])
