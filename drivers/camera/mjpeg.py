@@ -48,13 +48,13 @@ _VARIABLE = 1.5
 """Times the median gap: where a quarter of the gaps are longer, the rate varies and no frame is due."""
 
 FROZEN_AFTER = 1.5
-"""s of one picture after which a stream is frozen: a real sensor's noise changes every picture."""
+"""Seconds of one picture after which a stream is frozen: a real sensor's noise changes every picture."""
 
 FROZEN_FRAMES = 5
 """Pictures that are the same, at least."""
 
 _FIRST_CHANGE = 3.0
-"""s that opening waits for a second picture, unlike the first."""
+"""Seconds that opening waits for a second picture, unlike the first."""
 
 _BLACK, _MIN_TONED = 15, 0.01
 """Grey levels from black and from white that have no colour, and the fraction of the other pixels that a

@@ -7,10 +7,10 @@ import numpy as np
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray
 
 _BLOCK = 0.05
-"""s whose median is the level at its centre: longer than twice the longest contact of a hammer."""
+"""Seconds whose median is the level at its centre: longer than twice the longest contact of a hammer."""
 
 _WINDOW = 0.05
-"""s of rest next to the event that a straight line is fitted to."""
+"""Seconds of rest next to the event that a straight line is fitted to."""
 
 _MIN_BEFORE = 64
 """Quiet samples before the event that a line through them alone needs. An amplifier that passes no steady

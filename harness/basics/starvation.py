@@ -15,10 +15,10 @@ from pathlib import Path
 from harness.basics.clock import now
 
 PERIOD = 0.02
-"""s between two wakes."""
+"""Seconds between two wakes."""
 
 LATE = 0.1
-"""s of delay of one wake from which this process was starved."""
+"""Delay in s of one wake from which this process was starved."""
 
 BUSY_LOAD = 2.0
 """Programs that want to run, per processor, from which a computer is busy."""

@@ -40,7 +40,7 @@ USB_CAMERA = (
     "a USB camera is served as MJPEG over HTTP by a program such as ustreamer (ustreamer "
     "--device=/dev/video0 --format=MJPEG --host=127.0.0.1 --port=8080 serves http://127.0.0.1:8080/stream)"
 )
-"""What an operator of a USB camera does, because no driver reads one."""
+"""Advice to an operator of a USB camera, which no driver reads."""
 
 
 def _require_http(url: str | None) -> str | None:

@@ -37,7 +37,7 @@ A_MINUTE = 60.0
 """s after which a work that has no bar says how far it is."""
 
 _REPEAT = 1.0
-"""s between checks whether a stage has been silent for a minute."""
+"""Seconds between checks whether a stage has been silent for a minute."""
 
 _DIGITS = re.compile(r"[\d.]+")
 """What changes in what is being done without another stage beginning."""

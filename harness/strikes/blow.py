@@ -27,7 +27,7 @@ _LOUD = 0.02
 """Of the peak, or eight deviations of the noise: from there on, something touches."""
 
 _ROUNDS = 3
-"""Of finding what is loud against a rest, and the rest next to it."""
+"""Iterations of finding the loud samples and the rest next to them."""
 
 _LEAST_REST = 8
 _ABOVE_NOISE = 8.0

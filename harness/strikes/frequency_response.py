@@ -28,10 +28,10 @@ _MISFIT = 0.02
 """Fraction of a response's power that the other blows may leave unexplained."""
 
 _MIN_MISFIT, _OUTLIER = 2e-3, 5.0
-"""Of three blows and more, one that leaves this much, and this many times the median, is reported."""
+"""Residual of one of three or more blows, and its ratio to the median, from which it is reported."""
 
 _ALIGNED = 0.5
-"""Of that fraction, what a delay, a sign or a gain must leave at most to be the cause."""
+"""Largest fraction of that residual that a delay, a sign or a gain leaves if it is the cause."""
 
 _DELAY = 0.3
 """Samples: a shorter delay is not reported."""
@@ -46,7 +46,7 @@ _EARLY = 3.0
 """Samples by which a response may start before its blow: a converter's filter rings."""
 
 _LATE = 1e-3
-"""s after the blow from which a response that starts late is reported."""
+"""Seconds after the blow from which a response that starts late is reported."""
 
 _QUIET_SAMPLES = 64
 """Samples before a blow from which the response's noise is known."""

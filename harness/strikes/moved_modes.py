@@ -42,7 +42,7 @@ rows are the modes."""
 
 _SMOOTHED_LINES = 3
 _PEAK_FRACTION = 0.1
-"""Of ``PoleSearch.misfit``: a row's residual below this fraction of the row's highest line is not a mode."""
+"""Factor on ``PoleSearch.misfit``: a row's residual below this fraction of its highest line is no mode."""
 
 _NOISE_PEAK = 8.0
 """Local residual power over that of the shared poles from which a row has another mode."""

@@ -25,7 +25,7 @@ MEMORY = 2 * 10**9
 """Bytes that a command may have resident."""
 
 SECONDS = 60
-"""s of processor time that a command may take; the system kills it then."""
+"""Seconds of processor time that a command may take; the system kills it then."""
 
 
 def graph(nodes: list[NodeProto], **constants: AnyArray) -> bytes:

@@ -13,7 +13,7 @@ from tests.support.hostile_meshes import FILES, MEMORY, SECONDS
 
 @pytest.fixture(scope="module")
 def readings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, object]]:
-    """What reading each file gave, by its name."""
+    """Result of reading each file, by its name."""
     folder = tmp_path_factory.mktemp("hostile") / "files"
     # Every thread of a linear algebra library takes address space of its own.
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}

@@ -14,7 +14,7 @@ FOLDER_LOCK = ".in-use.lock"
 """Name of the lock file in a folder that a program writes to; it is removed when the program is done."""
 
 _RETRY_INTERVAL = 0.02
-"""s between two attempts at a lock."""
+"""Seconds between two attempts at a lock."""
 
 
 def take_lock(path: Path, attempts: int = 1) -> int | None:

@@ -157,16 +157,17 @@ def _rendered(
 
     begun = time.perf_counter()
     of = ObjectFile.open(folder)
-    touch, exact = open_touch(of, level), open_touch(of, "reference")
+    touch = open_touch(of, level)
     require_gel(of, touch.entry.gel, by.gel.sensor, by.gel.calibration.header.skirt)
     place = places.pressed_place(of.mesh, contact, vertex)
     # The first press makes ready what all that follow use.
     _pressed(of, touch, place, by)
-    assert isinstance(exact.maps, ReferenceMaps)
-    exact.maps.require_clear(Presses.one(place.point, place.normal, *by.pose))
     loaded, begun = time.perf_counter() - begun, time.perf_counter()
     press = _pressed(of, touch, place, by)
     seconds = {"load": loaded, "render": time.perf_counter() - begun}
+    exact = touch if level == "reference" else open_touch(of, "reference")
+    assert isinstance(exact.maps, ReferenceMaps)
+    exact.maps.require_clear(Presses.one(place.point, place.normal, *by.pose))
     if level == "reference":
         return RenderedPress(of, touch, place, by.pose, press, None, seconds)
     begun = time.perf_counter()

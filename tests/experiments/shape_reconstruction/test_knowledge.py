@@ -1,4 +1,4 @@
-"""How each part of a plain answer is known, and which extents nothing limits."""
+"""Tests of the stated knowledge of a plain answer and of its unlimited extents."""
 
 from dataclasses import replace
 from itertools import product

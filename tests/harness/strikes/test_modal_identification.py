@@ -286,7 +286,7 @@ PAIR = np.array([1681.2, 1684.2])
 
 
 def pair_response(amplitudes: list[tuple[float, float]], damping: float) -> tuple[FloatArray, ComplexArray]:
-    """Hz and accelerance of two modes, a row for each pair of amplitudes, with noise of a thousandth."""
+    """Make the accelerance of two modes, a row for each pair of amplitudes, with noise of a thousandth."""
     random = np.random.default_rng(0)
     frequencies = np.arange(1500.0, 1900.0, 0.5)
     s, omegas = 2j * np.pi * frequencies, 2.0 * np.pi * PAIR[:, None]

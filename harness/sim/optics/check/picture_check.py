@@ -31,7 +31,7 @@ _BLOCKS = 40
 """Along the longer side."""
 
 _GAINS = (0.4, 2.0)
-"""Of a light that is corrected: outside, grey levels are too coarse or clipped."""
+"""Gains of a light that is corrected: outside, grey levels are too coarse or clipped."""
 
 _MAX_OFFSET = 60.0
 """Grey levels of an offset that is corrected; a gamma of 1.5 is like 55."""
@@ -64,7 +64,7 @@ _SIMPLE = 3
 """Models of the light, without those that would follow what a contact does to its surroundings."""
 
 _LEAST_TOUCHED = 0.03
-"""Of the blocks, that show a contact of their own beside a change of the light."""
+"""Fraction of the blocks that show a contact of their own beside a change of the light."""
 
 _MIN_TILT_CHANGE = 0.7
 """Grey levels, length over the channels: a face that changes less is 0.1 mm from side to side."""

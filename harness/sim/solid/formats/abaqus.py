@@ -18,7 +18,7 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused
 from harness.basics.files.foreign_file import MOST_DATA
 from harness.basics.files.text_file import read_text_bytes
-from harness.sim.solid.formats.cells import CellBlock, CellFile
+from harness.sim.solid.formats.cells import CellBlock, CellFile, node_indices
 from harness.sim.solid.text_numbers import refuse_number, require_few, show
 
 _REFUSED = frozenset(
@@ -365,7 +365,9 @@ def _joined(
         places = np.array(scope.places).reshape(-1, 3)
         order = _order(scope, places, name)
         for kind, rows, line in scope.elements:
-            blocks.append(CellBlock(kind, before + _indices(rows, scope, order, f"{name}, line {line}")))
+            where = f"{name}, line {line}: an element names node"
+            numbers = np.array(scope.numbers, dtype=np.int64)
+            blocks.append(CellBlock(kind, before + node_indices(rows, numbers, order, where)))
         for label in scope.sets:
             found = before + _members(scope.sets[label], scope, order)
             for known in (label, f"{instance}.{label}") if instance else (label,):
@@ -391,19 +393,6 @@ def _order(scope: _Scope, places: FloatArray, name: str) -> IntArray:
             f"{name}: node {numbers[order[moved[0]]]} has two different places; export it again"
         )
     return order
-
-
-def _indices(rows: IntArray, scope: _Scope, order: IntArray, where: str) -> IntArray:
-    """Convert node numbers to indices within a scope."""
-    numbers = np.array(scope.numbers, dtype=np.int64)[order]
-    at = np.minimum(np.searchsorted(numbers, rows), max(len(numbers) - 1, 0))
-    missing = rows != numbers[at] if len(numbers) else np.ones(rows.shape, dtype=np.bool_)
-    if missing.any():
-        raise MeshRefused(
-            f"{where}: an element names node {rows[missing][0]}, which is not there; the file is cut short "
-            "or damaged, export it again"
-        )
-    return np.asarray(order[at], dtype=np.int64)
 
 
 def _members(members: list[int | str], scope: _Scope, order: IntArray) -> IntArray:

@@ -17,7 +17,7 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused
 from harness.basics.files.foreign_file import MOST_DATA
 from harness.basics.files.text_file import read_text_bytes
-from harness.sim.solid.formats.cells import CellBlock, CellFile
+from harness.sim.solid.formats.cells import CellBlock, CellFile, node_indices
 from harness.sim.solid.text_numbers import MAX_LINE, refuse_number, require_few, show
 
 _ELEMENTS = {
@@ -287,16 +287,7 @@ class _Reader:
         return origin, np.array([np.cross(y, z), y, z])
 
     def _indices(self, rows: IntArray, numbers: IntArray, order: IntArray) -> IntArray:
-        """Convert numbers of grid points to indices."""
-        ordered = numbers[order]
-        at = np.minimum(np.searchsorted(ordered, rows), max(len(ordered) - 1, 0))
-        missing = rows != ordered[at] if len(ordered) else np.ones(rows.shape, dtype=np.bool_)
-        if missing.any():
-            raise MeshRefused(
-                f"{self._name}: an entry names grid point {rows[missing][0]}, which is not there; the file "
-                "is cut short or damaged, export it again"
-            )
-        return np.asarray(order[at], dtype=np.int64)
+        return node_indices(rows, numbers, order, f"{self._name}: an entry names grid point")
 
 
 def _to_basic(places: FloatArray, kind: str, origin: FloatArray, axes: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""How often the family is searched, which fit is kept, and what its competitors are."""
+"""Number of searches of the family, the fit that is kept, and its competitors."""
 
 from dataclasses import replace
 
@@ -35,7 +35,7 @@ def part(contacts: int, sighted: bool = True) -> ShapeEvidence:
 
 
 def details_of(poor: bool = False, strain: float = 0.0, rival: float = 0.0) -> dict[str, object]:
-    """What the family's estimate reports besides its surface."""
+    """Details of the family's estimate besides its surface."""
     return {
         "cost": 1.0, "contact_cost": (2.0 if poor else 0.1) * LOOSE, "strain": strain,
         "strained": strain > STRAINED, "sighted": True, "beyond_m": 0.0, "hypotheses": HYPOTHESES,
