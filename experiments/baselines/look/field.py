@@ -6,15 +6,16 @@ picture is sampled from where it may meet that ball to where it leaves it; no sa
 or hidden.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.mesh import Mesh
-from harness.objectfile.published.field import Field, OneNetwork
-from harness.objectfile.published.march import ray_weights
+from harness.objectfile.published.look import OsfNetwork
 from harness.objectfile.published.tensors import osf_tensors
+from harness.objectfile.published.volume_render import render_rays, stretched_sigmoid
 from harness.objectfile.runtime import Network
 from harness.picture.pinhole import DirectionalLight, Pinhole
 
@@ -22,8 +23,8 @@ FIELD_FILE = "vision_field.onnx"
 REACH = 4.0
 """Radii of the ball, that samples lie within."""
 
-_RAYS = 2048
-_STRETCH = 1.2
+RawField = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+"""``(n, 3)`` points and views and a ``(3,)`` light to ``(n, 4)`` raw red, green, blue and density."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ class UniformField:
         samples: of a ray.
     """
 
-    field: Field
+    field: RawField
     middle: FloatArray
     radius: float
     samples: int
@@ -46,34 +47,19 @@ class UniformField:
         """``(rows, columns, 3)`` before white."""
         directions = camera.directions().reshape(-1, 3)
         eye = (camera.eye - self.middle) / self.radius
-        colours = [
-            self._rays(eye, directions[k : k + _RAYS], light.direction)
-            for k in range(0, len(directions), _RAYS)
-        ]
-        grey = np.rint(255.0 * np.clip(np.concatenate(colours), 0.0, 1.0)).astype(np.uint8)
-        return grey.reshape(camera.height, camera.width, 3)
-
-    def _rays(self, eye: FloatArray, directions: FloatArray, light: FloatArray) -> FloatArray:
-        """``(r, 3)`` of 0 to 1 before white."""
         away = float(np.linalg.norm(eye))
-        depths = np.broadcast_to(
-            np.linspace(away - 1.0, away + 1.0, self.samples), (len(directions), self.samples)
-        )
-        points = eye + directions[:, None] * depths[..., None]
-        views = np.broadcast_to(directions[:, None], points.shape)
-        raw = self.field(points.reshape(-1, 3), views.reshape(-1, 3), light).reshape(*depths.shape, 4)
-        # Nothing was learned outside of the ball, and the object lies within it.
-        density = np.where(np.linalg.norm(points, axis=-1) <= 1.0, raw[..., 3], 0.0)
-        weights = ray_weights(density, depths, directions)
-        colour = np.einsum("rs,rsc->rc", weights, stretched(raw[..., :3]))
-        found: FloatArray = colour + (1.0 - weights.sum(axis=1))[:, None]
-        return found
 
+        def shown(points: FloatArray, views: FloatArray) -> tuple[FloatArray, FloatArray]:
+            raw = self.field(points, views, light.direction)
+            # Nothing was learned outside of the ball, and the object lies within it.
+            density = np.where(np.linalg.norm(points, axis=-1) <= 1.0, raw[:, 3], 0.0)
+            return density, stretched_sigmoid(raw[:, :3])
 
-def stretched(raw: FloatArray) -> FloatArray:
-    """Colours as shown of raw ones: a sigmoid stretched by 1.2 about a half, as published."""
-    found: FloatArray = 0.5 + 0.5 * _STRETCH * np.tanh(0.5 * raw)
-    return found
+        depths = np.linspace(away - 1.0, away + 1.0, self.samples)
+        colour, cover = render_rays(shown, eye, directions, depths)
+        white = colour + (1.0 - cover)[:, None]
+        grey = np.rint(255.0 * np.clip(white, 0.0, 1.0)).astype(np.uint8)
+        return grey.reshape(camera.height, camera.width, 3)
 
 
 def ball_of(mesh: Mesh) -> tuple[FloatArray, float]:
@@ -84,4 +70,4 @@ def ball_of(mesh: Mesh) -> tuple[FloatArray, float]:
 def opened_field(data: bytes, mesh: Mesh, samples: int) -> UniformField:
     """The network of a graph, ready for pictures of an object."""
     inputs, outputs = osf_tensors(REACH)
-    return UniformField(OneNetwork(Network(data, FIELD_FILE, inputs, outputs)), *ball_of(mesh), samples)
+    return UniformField(OsfNetwork(Network(data, FIELD_FILE, inputs, outputs)).raw, *ball_of(mesh), samples)

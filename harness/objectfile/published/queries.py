@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.basics.arrays import FloatArray, read_only
-from harness.basics.errors import DataRefused, OutOfDomain
+from harness.basics.errors import DataRefused
 from harness.basics.files.foreign_file import require_readable
 from harness.basics.files.named_file import require_file
 from harness.basics.npz_file import read_array
@@ -19,9 +19,6 @@ MOST_ROWS = 1000
 """Of one file: a thousand compatible sounds are 1 GB while they are computed."""
 
 _MOST_BYTES = 64 * 2**20
-
-_ROUNDING = 1e-6
-"""Of an extent: bounds of a published file are often float32."""
 
 
 def read_rows(path: Path, columns: int, what: str) -> FloatArray:
@@ -56,30 +53,3 @@ def require_pairs(first: FloatArray, second: FloatArray, what: str) -> None:
     """Refuse two files of different numbers of rows; ``what`` names both."""
     if len(first) != len(second):
         raise DataRefused(f"{len(first)} and {len(second)} rows of {what}; give one of each for each query")
-
-
-def require_in_box(points: FloatArray, low: FloatArray, high: FloatArray, what: str) -> None:
-    """Refuse points that networks were not trained at.
-
-    Args:
-        points: ``(n, 3)`` m.
-        low: ``(3,)`` m.
-        high: ``(3,)`` m.
-        what: the points are.
-
-    Raises:
-        OutOfDomain: naming the first.
-    """
-    slack = _ROUNDING * (high - low)
-    outside = np.flatnonzero(((points < low - slack) | (points > high + slack)).any(axis=1))
-    if len(outside):
-        x, y, z = points[outside[0]]
-        raise OutOfDomain(
-            f"{what} {outside[0]} at ({x:.6g}, {y:.6g}, {z:.6g}) m is outside of the box from "
-            f"{_corner(low)} to {_corner(high)} m that the network was trained in ({len(outside)} of "
-            f"{len(points)} are); give vertices of the object's own mesh"
-        )
-
-
-def _corner(corner: FloatArray) -> str:
-    return "(" + ", ".join(f"{value:.6g}" for value in corner) + ")"

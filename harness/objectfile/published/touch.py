@@ -6,15 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray, read_only
-from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
+from harness.basics.errors import OutOfDomain, WrongUse
 from harness.objectfile.published.entries import Bounds, PublishedColoursEntry, PublishedDepthEntry
 from harness.objectfile.published.folder import PublishedObject
-from harness.objectfile.published.queries import require_in_box
+from harness.objectfile.published.query import query, require_in_box
 from harness.objectfile.runtime import Network
 from harness.objectfile.self_test import open_network
-
-_AT_ONCE = 16384
-"""Pixels in one run of a network."""
 
 _ROUNDING = 1e-9
 """Relative, of an angle or depth at its limit."""
@@ -52,9 +49,8 @@ class PublishedDepths:
             pixels = np.empty((entry.rows, entry.columns, 9))
             pixels[..., :7] = (*vertex, tilt, math.cos(azimuth), math.sin(azimuth), depth)
             pixels[..., 7], pixels[..., 8] = np.arange(entry.rows)[:, None], np.arange(entry.columns)
-            maps[number] = _by_rows(self.network, "pixel", pixels.reshape(-1, 9), "depth").reshape(
-                maps.shape[1:]
-            )
+            depths = query(self.network, {"pixel": pixels.reshape(-1, 9)})["depth"]
+            maps[number] = depths.reshape(entry.rows, entry.columns)
         return read_only(maps)
 
 
@@ -112,7 +108,7 @@ class PublishedColours:
         places[..., :3] = normalised_coordinates(vertices, (low, high))[:, None, None]
         places[..., 3] = np.linspace(-1.0, 1.0, entry.rows)[:, None]
         places[..., 4] = np.linspace(-1.0, 1.0, entry.columns)
-        flat = _by_rows(self.network, "place", places.reshape(-1, 5), "colours")
+        flat = query(self.network, {"place": places.reshape(-1, 5)})["colours"]
         grey = np.clip(np.rint((flat + 1.0) / 2.0 * 255.0), 0, 255).astype(np.uint8)
         return read_only(grey.reshape(*places.shape[:3], 3))
 
@@ -132,14 +128,6 @@ def open_depths(of: PublishedObject, entry: PublishedDepthEntry) -> PublishedDep
 def open_colours(of: PublishedObject, entry: PublishedColoursEntry) -> PublishedColours:
     """The touch of an imported object of 1.0; ``DataRefused`` where its file is not the one described."""
     return PublishedColours(entry, open_network(of.read(entry.network), entry.network))
-
-
-def _by_rows(network: Network, taken: str, rows: FloatArray, given: str) -> FloatArray:
-    runs = [network({taken: rows[k : k + _AT_ONCE]})[given] for k in range(0, len(rows), _AT_ONCE)]
-    found = np.concatenate(runs).astype(np.float64)
-    if not np.isfinite(found).all():
-        raise DataRefused(f"{network.name} gives {given} that are not finite; import the file again")
-    return found
 
 
 def _require(values: FloatArray, limits: tuple[float, float], unit: float, what: str, named: str) -> None:

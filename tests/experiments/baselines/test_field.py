@@ -5,13 +5,14 @@ import pytest
 import trimesh
 
 from experiments.baselines.look.bench import DISTANCE
-from experiments.baselines.look.field import UniformField, ball_of, stretched
+from experiments.baselines.look.field import UniformField, ball_of
 from experiments.baselines.within import is_within
 from harness.authoring.vision.data import around
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.mesh import Mesh
 from harness.objectfile.published.camera import FOCAL, SIZE
+from harness.objectfile.published.volume_render import stretched_sigmoid
 from harness.picture.pinhole import DirectionalLight
 
 DENSE = 1e4
@@ -64,7 +65,7 @@ def test_what_a_field_holds_outside_of_the_ball_is_not_drawn() -> None:
 
 def test_colours_are_stretched_as_published() -> None:
     raw = np.array([-50.0, 0.0, 2.0, 50.0])
-    assert stretched(raw) == pytest.approx(1.2 * (1.0 / (1.0 + np.exp(-raw)) - 0.5) + 0.5)
+    assert stretched_sigmoid(raw) == pytest.approx(1.2 * (1.0 / (1.0 + np.exp(-raw)) - 0.5) + 0.5)
 
 
 def test_places_within_a_closed_surface_are_told_from_those_without() -> None:

@@ -68,8 +68,7 @@ def _of_spectra(
 ) -> "tuple[FloatArray, float]":
     import numpy as np
 
-    from harness.objectfile.published.sound import peak_normalised
-    from harness.objectfile.published.spectrum_sound import open_spectra
+    from harness.objectfile.published.sound import open_spectra, peak_normalised
 
     sound, (vertices, forces) = open_spectra(of, entry), rows
     into.notes.append(

@@ -19,17 +19,16 @@ def views_written(
     import numpy as np
 
     from harness.objectfile.published.camera import views_of
-    from harness.objectfile.published.field import open_fields
-    from harness.objectfile.published.march import picture_of
+    from harness.objectfile.published.look import open_look
     from harness.picture.image_file import write_png
 
     entry = of.description.vision
     assert entry is not None
     cube = None if entry.cells is None else np.array([entry.cells.low, entry.cells.high])
     reach = entry.near if cube is None else float(np.linalg.norm(np.abs(cube).max(axis=0)))
-    views, fields, written = views_of(rows[0], reach, given.compat), open_fields(of, entry), []
+    views, look, written = views_of(rows[0], reach, given.compat), open_look(of, entry), []
     for number, view in enumerate(views):
-        picture = picture_of(entry, fields, view, given.size, 0.0 if given.compat else _CENTRE)
+        picture = look.picture(view, given.size, 0.0 if given.compat else _CENTRE)
         written.append(out / f"{number:03d}.png")
         write_png(written[-1], picture.truncated() if given.compat else picture.rounded())
     into.files[VISION] = written

@@ -7,11 +7,9 @@ import pytest
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.objectfile.published.camera import views_of
-from harness.objectfile.published.field import open_fields
 from harness.objectfile.published.folder import PublishedObject
-from harness.objectfile.published.march import picture_of
-from harness.objectfile.published.sound import COMPAT_RATE, compat_sounds, open_gains
-from harness.objectfile.published.spectrum_sound import open_spectra
+from harness.objectfile.published.look import open_look
+from harness.objectfile.published.sound import COMPAT_RATE, compat_sounds, open_gains, open_spectra
 from harness.objectfile.published.touch import open_colours, open_depths
 from tests.oracles import objectfolder_formulas as formulas
 from tests.samples import published_trees
@@ -93,12 +91,13 @@ def test_one_network_of_a_look_is_that_of_the_published_formulas(
         directions(9),
         directions(1, 8)[0],
     )
-    for prefix, field in zip(("model_coarse.", "model_fine."), open_fields(of, look), strict=True):
-        assert field is not None
+    opened = open_look(of, look)
+    for prefix, network in zip(("model_coarse.", "model_fine."), (opened.coarse, opened.fine), strict=True):
+        assert network is not None
         wanted = np.stack(
             [formulas.osf(state, prefix, 4, 1, p, v, light) for p, v in zip(places, views, strict=True)]
         )
-        found = field(places, views, light)
+        found = network.raw(places, views, light)
         assert apart(found[:, :3], wanted[:, :3]) < CLOSE
         assert apart(found[:, 3], wanted[:, 3]) < CLOSE
 
@@ -110,11 +109,11 @@ def test_the_networks_of_cells_are_those_of_the_published_formulas(
     assert of.description.vision is not None
     places = np.random.default_rng(0).uniform(-0.61, 0.61, (300, 3))
     views, light = directions(300), directions(1, 8)[0]
-    field, _ = open_fields(of, of.description.vision)
+    look = open_look(of, of.description.vision)
     wanted = np.stack(
         [formulas.kilo(tree["VisionNet"], p, v, light) for p, v in zip(places, views, strict=True)]
     )
-    found = field(places, views, light)
+    found = look.coarse.raw(places, views, light)
     nothing = ~wanted.any(axis=1)
     assert 40 < np.count_nonzero(nothing) < 260
     assert not found[nothing].any()
@@ -165,13 +164,14 @@ def test_both_networks_of_a_look_of_version_1_are_those_of_the_published_formula
         directions(1, 8)[0],
     )
     keys = ("network_fn_state_dict", "network_fine_state_dict")
-    for key, field in zip(keys, open_fields(of, of.description.vision), strict=True):
-        assert field is not None
+    look = open_look(of, of.description.vision)
+    for key, network in zip(keys, (look.coarse, look.fine), strict=True):
+        assert network is not None
         state = tree["VisionNet"][key]
         wanted = np.stack(
             [formulas.osf(state, "", 8, 4, p, v, light) for p, v in zip(places, views, strict=True)]
         )
-        assert apart(field(places, views, light), wanted) < CLOSE
+        assert apart(network.raw(places, views, light), wanted) < CLOSE
 
 
 def test_a_compatible_sound_is_the_published_programs(second: tuple[dict[str, Any], PublishedObject]) -> None:
@@ -202,7 +202,7 @@ def test_a_compatible_picture_is_the_published_programs(which: str, request: pyt
     look, size, eye, light = of.description.vision, 6, np.array([1.2, -1.5, 1.6]), np.array([0.0, -0.6, 0.8])
     eye *= 2.5 / np.linalg.norm(eye)
     view = views_of(np.array([[*eye, *light]]), 1.04, compat=True)[0]
-    found = picture_of(look, open_fields(of, look), view, size, 0.0)
+    found = open_look(of, look).picture(view, size, 0.0)
     rays, settings = formulas.camera_rays(eye, size), tree["VisionNet"]["cfg"]
     assert found.cover.max() > 0.5
     for row, column in [(0, 0), (2, 3), (3, 3), (4, 1), (5, 5)]:

@@ -8,16 +8,16 @@ import pytest
 
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.published.field import open_fields
 from harness.objectfile.published.folder import PublishedObject
+from harness.objectfile.published.look import open_look
 from harness.objectfile.published.sound import (
     PublishedGains,
     compat_sounds,
     open_gains,
+    open_spectra,
     peak_normalised,
     rung,
 )
-from harness.objectfile.published.spectrum_sound import open_spectra
 from harness.objectfile.published.taxim_picture import TaximPicture, table_colours
 from harness.objectfile.published.touch import PublishedColours, PublishedDepths, open_colours, open_depths
 from harness.objectfile.verify.verify import verify_published
@@ -112,7 +112,7 @@ def test_presses_at_the_limits_are_allowed_and_an_azimuth_is_an_angle(second: Pu
 
 def test_a_look_answers_a_point_alike_in_any_company(second: PublishedObject) -> None:
     assert second.description.vision is not None
-    field, _ = open_fields(second, second.description.vision)
+    field = open_look(second, second.description.vision).coarse.raw
     random = np.random.default_rng(0)
     points, views = random.uniform(-0.6, 0.6, (500, 3)), random.normal(size=(500, 3))
     light = np.array([0.0, 0.6, 0.8])
@@ -127,7 +127,7 @@ def test_a_thousandth_within_the_faces_of_its_cube_a_look_is_empty(tmp_path: Pat
     tree["VisionNet"]["occupancy_grid"] = np.ones_like(tree["VisionNet"]["occupancy_grid"])
     of = imported_object({"VisionNet": tree["VisionNet"]}, tmp_path / "mug")
     assert of.description.vision is not None
-    field, _ = open_fields(of, of.description.vision)
+    field = open_look(of, of.description.vision).coarse.raw
     inward = np.array([0.0, 0.9e-3, 1.1e-3, 0.1])
     for axis in range(3):
         for side in (-1.0, 1.0):
