@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import ClassVar
 
 import numpy as np
 
@@ -24,6 +25,8 @@ class Material:
         alpha: 1/s, mass-proportional damping.
         beta: s, stiffness-proportional damping.
     """
+
+    key_name: ClassVar[str] = "harness.basics.materials.Material"
 
     name: str
     density: float

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,6 +17,8 @@ class Mesh:
         vertices: ``(n, 3)`` metres, in the object's frame.
         faces: ``(m, 3)`` indices into the vertices.
     """
+
+    key_name: ClassVar[str] = "harness.basics.mesh.Mesh"
 
     vertices: FloatArray
     faces: IntArray

@@ -117,21 +117,19 @@ class Store:
 
 
 def digest(value: Any) -> str:
-    """A hash of what a value holds: its arrays' bytes, types and shapes, and its numbers to the last bit.
+    """Hash a value's content: bytes, types and shapes of its arrays, and its numbers to the last bit.
+
+    A dataclass is hashed by its ``key_name`` and its fields. The ``key_name`` is permanent: it stays when the class
+    is renamed or moved, so that stored results are found again.
 
     Raises:
-        TypeError: a value that has no such description.
+        TypeError: the value is neither of these, or a dataclass without a ``key_name``.
     """
     state = hashlib.sha256()
     for piece in _pieces(value):
         state.update(struct.pack("<Q", len(piece)))
         state.update(piece)
     return state.hexdigest()
-
-
-def type_name(kind: type) -> str:
-    """The name that a dataclass has in keys."""
-    return f"{kind.__module__}.{kind.__qualname__}"
 
 
 def _pieces(value: Any) -> "list[bytes]":
@@ -152,6 +150,9 @@ def _pieces(value: Any) -> "list[bytes]":
     if isinstance(value, OnDisk):
         return [f"on disk {value.content_key}".encode()]
     if is_dataclass(value) and not isinstance(value, type):
+        name = getattr(value, "key_name", None)
+        if not isinstance(name, str):
+            raise TypeError(f"{type(value).__qualname__} cannot be hashed: it defines no key_name")
         parts = [(item.name, vars(value)[item.name]) for item in fields(value)]
-        return [type_name(type(value)).encode(), *(p for part in parts for p in _pieces(part))]
+        return [name.encode(), *(p for part in parts for p in _pieces(part))]
     raise TypeError(f"a {type(value).__qualname__} cannot be hashed; pass arrays, numbers or dataclasses")

@@ -7,6 +7,7 @@ path.
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import ClassVar
 
 from harness.basics.errors import WrongUse
 from harness.basics.files.named_file import nearest, real_path
@@ -28,6 +29,8 @@ class MarkerGrid:
         spacing: metres between neighbours.
         radius: metres.
     """
+
+    key_name: ClassVar[str] = "harness.bench.sensor.MarkerGrid"
 
     rows: int
     columns: int
@@ -55,6 +58,8 @@ class TactileSensor:
         markers: the dots printed on the gel, None where there are none.
         casts_shadow: whether a grazing light makes shadows worth simulating.
     """
+
+    key_name: ClassVar[str] = "harness.bench.sensor.TactileSensor"
 
     name: str
     rows: int

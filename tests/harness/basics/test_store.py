@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -10,8 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.basics.store import Store, default_folder, digest
+from harness.bench.sensor import MarkerGrid, TactileSensor
 
 KEY = "ab" * 32
 
@@ -86,6 +88,8 @@ def test_the_folder_follows_the_environment(monkeypatch: pytest.MonkeyPatch, tmp
 
 @dataclass(frozen=True)
 class Part:
+    key_name: ClassVar[str] = "part"
+
     a: Any
     b: Any = None
 
@@ -128,3 +132,21 @@ def test_a_mesh_can_be_hashed_and_a_stranger_cannot() -> None:
     assert digest(mesh) == digest(same)
     with pytest.raises(TypeError, match="cannot be hashed"):
         digest(object())
+
+
+def test_a_dataclass_without_a_key_name_is_refused() -> None:
+    @dataclass(frozen=True)
+    class Unnamed:
+        a: int
+
+    with pytest.raises(TypeError, match="key_name"):
+        digest(Unnamed(1))
+
+
+def test_stored_types_keep_the_keys_they_always_had() -> None:
+    # Computed at 027a4fe2; another value would make every stored result of a user's cache useless.
+    mesh = Mesh(np.eye(3), np.array([[0, 1, 2]]))
+    sensor = TactileSensor("gel", 2, 3, 1e-4, 2e-3, None, (0.03, 0.03), MarkerGrid(2, 2, 0.001, 0.001))
+    assert digest(mesh).startswith("a6c719d3da74d3d4")
+    assert digest(MATERIALS["steel"]).startswith("5838775fb26d9f9e")
+    assert digest(sensor).startswith("c5e66238c06a396c")
