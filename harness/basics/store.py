@@ -119,8 +119,8 @@ class Store:
 def digest(value: Any) -> str:
     """Hash a value's content: bytes, types and shapes of its arrays, and its numbers to the last bit.
 
-    A dataclass is hashed by its ``key_name`` and its fields. The ``key_name`` is permanent: it stays when the class
-    is renamed or moved, so that stored results are found again.
+    A dataclass is hashed by its ``key_name`` and its fields. The ``key_name`` is permanent: it stays when the
+    class is renamed or moved, so that stored results are found again.
 
     Raises:
         TypeError: the value is neither of these, or a dataclass without a ``key_name``.
