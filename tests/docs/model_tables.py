@@ -1,11 +1,13 @@
 """Tables of the keys of pydantic models and dataclasses, for the pages of docs/reference."""
 
+import ast
 import re
 import types
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
-from inspect import cleandoc
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from inspect import cleandoc, getsource
+from textwrap import dedent
+from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic import AfterValidator, BaseModel
@@ -22,16 +24,20 @@ def summary(documented: Any) -> str:
     return markdown(cleandoc(documented.__doc__ or "").split("\n\n")[0])
 
 
-def meanings(documented: Any) -> dict[str, str]:
-    """The ``Attributes:`` of a docstring, each on one line."""
-    said = cleandoc(documented.__doc__ or "")
-    _, found, listed = said.partition("Attributes:\n")
-    if not found:
-        return {}
-    block = re.split(r"\n(?=\S)|\n\n(?=\S)", listed)[0]
-    entries = re.split(r"^    (?=\w)", block, flags=re.M)[1:]
-    pairs = (" ".join(entry.split()).partition(": ") for entry in entries)
-    return {name: markdown(text) for name, _, text in pairs}
+def meanings(documented: type) -> dict[str, str]:
+    """Descriptions of a class's own fields: the ``#:`` comment on a field's line, or the string below it."""
+    source = dedent(getsource(documented))
+    lines, body = source.splitlines(), cast(ast.ClassDef, ast.parse(source).body[0]).body
+    found: dict[str, str] = {}
+    for statement, below in zip(body, [*body[1:], None], strict=True):
+        if not (isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name)):
+            continue
+        _, comment, text = lines[(statement.end_lineno or statement.lineno) - 1].partition("  #: ")
+        if comment:
+            found[statement.target.id] = markdown(text)
+        elif isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
+            found[statement.target.id] = markdown(str(below.value.value))
+    return found
 
 
 def markdown(text: str) -> str:
@@ -74,10 +80,10 @@ def keys(model: type[BaseModel], names: dict[type[BaseModel], str]) -> list[tupl
 
 
 def inherited_meanings(model: type) -> dict[str, str]:
-    """The ``Attributes:`` of a class and of what it inherits."""
+    """Descriptions of the fields of a class and of its bases."""
     found: dict[str, str] = {}
     for base in reversed(model.__mro__):
-        if base.__module__ != "builtins":
+        if base.__module__.partition(".")[0] not in ("builtins", "pydantic", "abc", "typing"):
             found.update(meanings(base))
     return found
 
