@@ -118,18 +118,11 @@ class Side:
             "--json",
         )
         if PRESSES.is_dir():
-            ball = ("--ball-radius", "3.155mm", "--pitch", "0.0634mm", "--sensor", "gelsight-mini")
-            ball += ("--background", str(PRESSES / "background.png"))
-            self.write_once(
-                "taxim_mini.json",
-                "calibrate",
-                "taxim",
-                str(PRESSES / "ball_6.310mm"),
-                *ball,
-                "--out",
-                "mini.npz",
-                "--json",
+            ball = (
+                *(str(PRESSES / "ball_6.310mm"), "--background", str(PRESSES / "background.png")),
+                *("--ball-radius", "3.155mm", "--pitch", "0.0634mm", "--sensor", "gelsight-mini"),
             )
+            self.write_once("taxim_mini.json", "calibrate", "taxim", *ball, "--out", "mini.npz", "--json")
             press = str(PRESSES / "ball_6.310mm" / "05.png")
             depth = ("--calibration", "mini.npz", "--sensor", "gelsight-mini", "--out", "depth.npz", "--json")
             self.write_once("depth.json", "depth", press, *depth)
