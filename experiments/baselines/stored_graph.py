@@ -18,7 +18,7 @@ class TorchMissing(Exception):
 
 def require_torch(what: str) -> None:
     """Raise ``TorchMissing`` where torch is not installed."""
-    if find_spec("torch") is None:
+    if any(find_spec(name) is None for name in ("torch", "onnxscript")):
         raise TorchMissing(f"{what} has to be trained, which needs torch: pip install '.[author]'")
 
 

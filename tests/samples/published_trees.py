@@ -40,8 +40,8 @@ def first(seed: int = 0, prefix: str = "module.") -> Tree:
     look = {
         "global_step": 200_000,
         "optimizer_state_dict": {"state": {0: {"step": 1}}, "param_groups": [{"lr": 5e-4, "params": [0]}]},
-        "network_fn_state_dict": _osf(random, "", 8, 256, 4, (10, 4)),
-        "network_fine_state_dict": _osf(random, "", 8, 256, 4, (10, 4)),
+        "network_fn_state_dict": _osf(random, "", 8, 12, 4, (10, 4)),
+        "network_fine_state_dict": _osf(random, "", 8, 12, 4, (10, 4)),
     }
     voxels = np.argwhere(random.random((6, 6, 6)) < 0.5) + np.array([3, 9, 14])
     audio = {
@@ -88,20 +88,20 @@ def osf_look(
     """VisionNet of 2.0 of one network, or of a coarse and a fine one."""
     settings = _settings(importance) | {
         "num_hidden_layers": layers,
-        "hidden_layer_size": 24,
+        "hidden_layer_size": 12,
         "refeed_position_index": refeed,
     }
     names = ("model_coarse.", "model_fine.") if importance else ("",)
     skip = refeed if isinstance(refeed, int) else None
     state = {
-        key: array for name in names for key, array in _osf(random, name, layers, 24, skip, (10, 4)).items()
+        key: array for name in names for key, array in _osf(random, name, layers, 12, skip, (10, 4)).items()
     }
     return {"cfg": settings, "model_state_dict": state}
 
 
 def kilo_look(random: np.random.Generator, cells: tuple[int, int, int] = (4, 3, 2)) -> Tree:
     """VisionNet of 2.0 of a network a cell, on a small lattice of unequal sides."""
-    width, count, voxels = 16, int(np.prod(cells)), tuple(4 * size for size in cells)
+    width, count, voxels = 8, int(np.prod(cells)), tuple(4 * size for size in cells)
     settings = _settings(0) | {
         "fixed_resolution": list(cells),
         "global_domain_min": [-0.6, -0.6, -0.6],
@@ -170,7 +170,7 @@ def _branches(random: np.random.Generator, prefix: str, inputs: int, outputs: in
     return found
 
 
-def _mlp(random: np.random.Generator, prefix: str, inputs: int, outputs: int, width: int = 20) -> Tree:
+def _mlp(random: np.random.Generator, prefix: str, inputs: int, outputs: int, width: int = 8) -> Tree:
     encoded = inputs * 21
     found: Tree = {}
     for k in range(8):

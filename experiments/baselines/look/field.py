@@ -1,6 +1,6 @@
 """ObjectFolder 1.0's look: one network for the whole object, and samples spread evenly along every ray.
 
-The layout is the published one (``harness.objectfile.published.graphs.OsfWeights``): place, view and light to
+The layout is the published one (``harness.authoring.published.modules.Osf``): place, view and light to
 a raw colour and density, in a frame in which the ball around the object has the radius 1. Every ray of the
 picture is sampled from where it may meet that ball to where it leaves it; no sample is left out, be it empty
 or hidden.
@@ -13,8 +13,7 @@ import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.mesh import Mesh
-from harness.objectfile.published.look import OsfNetwork
-from harness.objectfile.published.tensors import osf_tensors
+from harness.objectfile.published.look import OsfNetwork, osf_tensors
 from harness.objectfile.published.volume_render import render_rays, stretched_sigmoid
 from harness.objectfile.runtime import Network
 from harness.picture.pinhole import DirectionalLight, Pinhole

@@ -6,11 +6,10 @@ from experiments.baselines.settings import FitSpec
 from experiments.baselines.touch.bench import MIDDLE, SEED, TouchBench
 from experiments.baselines.touch.colours import CHANNELS, INPUTS, colours_pair, pixel_places
 from experiments.baselines.training.fit import fitted
+from harness.authoring.published.modules import exported_graph
 from harness.authoring.touch.data import reference_maps, smooth_normals
 from harness.authoring.training import Report
 from harness.basics.arrays import AnyArray, FloatArray
-from harness.objectfile.graph import Encoding, Normaliser
-from harness.objectfile.published.graphs import perceptron_graph_of
 from harness.sim.gel.presses import Presses
 
 
@@ -40,12 +39,9 @@ class ColourRows:
 def train_colours(bench: TouchBench, spec: FitSpec, report: Report) -> bytes:
     """The graph of the trained network."""
     rows = ColourRows(bench, spec.batch)
-    weights = fitted(
+    network = fitted(
         spec, (INPUTS, CHANNELS), rows, SEED, lambda share: report("touch: training 1.0's network", share)
     )
-    as_it_is = Normaliser(np.zeros(INPUTS), np.ones(INPUTS))
-    encoding = Encoding.octaves(spec.octaves)
-    graph = perceptron_graph_of(
-        colours_pair(), [weights], as_it_is, "A pixel of a press, as in 1.0.", encoding
-    )
-    return graph.SerializeToString()
+    taken, given = colours_pair()
+    doc = "A pixel of a press, as in 1.0."
+    return exported_graph(network, (taken,), (given,), doc).SerializeToString()

@@ -15,14 +15,14 @@ from experiments.baselines.look.bench import ViewBench
 from experiments.baselines.look.field import REACH, ball_of
 from experiments.baselines.settings import FieldSpec
 from experiments.baselines.within import is_within
-from harness.authoring.perceptron import arrays_of, dense_layers, encode, set_rate
+from harness.authoring.perceptron import dense_layers, encode, set_rate
+from harness.authoring.published.modules import Osf, exported_graph
 from harness.authoring.training import Report
 from harness.authoring.vision.lessons import Lessons, draw_for
 from harness.authoring.vision.places import sphere
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray
-from harness.objectfile.graph import Encoding, MlpWeights, Normaliser
-from harness.objectfile.published.graphs import OsfWeights, osf_graph
-from harness.objectfile.published.tensors import osf_tensors
+from harness.objectfile.graph import Encoding, Normaliser
+from harness.objectfile.published.look import osf_tensors
 from harness.picture.srgb import bytes_from_linear
 
 SEED = 0
@@ -65,14 +65,17 @@ class OsfField(nn.Module):
                 hidden = torch.relu(hidden)
         return hidden
 
-    def weights(self) -> OsfWeights:
-        """As plain arrays, the density's logit as a density."""
-        *inner, (weight, bias) = (arrays_of(layer) for layer in self.trunk if isinstance(layer, nn.Linear))
-        factor = np.ones(weight.shape[1])
-        factor[-1] = _STEEP
-        trunk = MlpWeights((*inner, (weight * factor, bias * factor)))
-        heads = arrays_of(self.direction), arrays_of(self.colour)
-        return OsfWeights(trunk, *heads, self._places, self._turns)
+    def to_published(self, spec: FieldSpec) -> Osf:
+        """Convert to the published layout, the density's logit as a density."""
+        width, turned = spec.width, spec.width // 2
+        network = Osf(width, turned, spec.depth, None, (spec.octaves, spec.turns))
+        network.pts_linears = nn.ModuleList(self.trunk[:-1])
+        network.views_lights_linears = nn.ModuleList([self.direction])
+        network.rgb_linear = self.colour
+        both = self.trunk[-1].state_dict()
+        network.bottleneck_linear.load_state_dict({name: rows[:-1] for name, rows in both.items()})
+        network.alpha_linear.load_state_dict({name: _STEEP * rows[-1:] for name, rows in both.items()})
+        return network
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +123,7 @@ def train_field(bench: ViewBench, spec: FieldSpec, report: Report) -> bytes:
         report("vision: training 1.0's field", (step + 1) / spec.steps)
     inputs, outputs = osf_tensors(REACH)
     doc = "A place, a view and a light to raw colour and density, as in 1.0."
-    return osf_graph(network.weights(), inputs, outputs, doc).SerializeToString()
+    return exported_graph(network.to_published(spec), inputs, outputs, doc).SerializeToString()
 
 
 def _loss(network: OsfField, rows: FieldRows, spec: FieldSpec, random: np.random.Generator) -> Tensor:

@@ -7,9 +7,10 @@ import torch
 from torch import Tensor, nn
 
 from experiments.baselines.settings import FitSpec
-from harness.authoring.perceptron import arrays_of, dense_layers, encode, set_rate
+from harness.authoring.perceptron import dense_layers, encode, set_rate
+from harness.authoring.published.modules import Perceptron, ScaledPerceptrons
 from harness.basics.arrays import AnyArray, FloatArray
-from harness.objectfile.graph import Encoding, MlpWeights, Normaliser
+from harness.objectfile.graph import Encoding, Normaliser
 
 Drawn = Callable[[np.random.Generator], tuple[FloatArray, AnyArray, AnyArray]]
 """From a generator to ``(batch, inputs)`` normalised inputs, ``(batch, outputs)`` targets and ``(batch,)``
@@ -45,15 +46,16 @@ class EncodedPerceptron(nn.Module):
             hidden = torch.relu(layer(hidden))
         return hidden
 
-    def weights(self) -> MlpWeights:
-        """As plain arrays."""
-        return MlpWeights(tuple(arrays_of(layer) for layer in self.layers if isinstance(layer, nn.Linear)))
-
 
 def fitted(
-    spec: FitSpec, sizes: tuple[int, int], draw: Drawn, seed: int, report: Callable[[float], None]
-) -> MlpWeights:
-    """The weights after all steps; the last layer is then solved for what those before it give.
+    spec: FitSpec,
+    sizes: tuple[int, int],
+    draw: Drawn,
+    seed: int,
+    report: Callable[[float], None],
+    scale: float = 1.0,
+) -> ScaledPerceptrons:
+    """Train a network, then solve its last layer for what those before it give.
 
     Args:
         spec: of the network and its training.
@@ -61,6 +63,7 @@ def fitted(
         draw: gives the rows of a step.
         seed: of first weights and of what is drawn.
         report: takes the share of the steps that is done.
+        scale: factor of the trained outputs.
     """
     torch.set_num_threads(1)
     network = EncodedPerceptron(spec, *sizes, seed)
@@ -74,11 +77,22 @@ def fitted(
         torch.autograd.backward(loss)
         adam.step()
         report((step + 1) / spec.steps)
-    return _solved(network, draw, random)
+    perceptron = Perceptron(
+        Encoding.octaves(spec.octaves).width(sizes[0]), spec.width, sizes[1], spec.depth, None
+    )
+    perceptron.pts_linears = nn.ModuleList(network.layers[:-1])
+    weight, bias = _solved(network, draw, random)
+    with torch.no_grad():
+        perceptron.output_linear.weight.copy_(torch.from_numpy(np.float32(weight.T)))
+        perceptron.output_linear.bias.copy_(torch.from_numpy(np.float32(bias)))
+    plain, scales = (np.zeros(sizes[0]), np.ones(sizes[0])), (np.full((1, 1), scale), np.zeros((1, 1)))
+    return ScaledPerceptrons([perceptron], *plain, *scales, spec.octaves)
 
 
-def _solved(network: EncodedPerceptron, draw: Drawn, random: np.random.Generator) -> MlpWeights:
-    """The network with the last layer of least weighted squares over fresh rows."""
+def _solved(
+    network: EncodedPerceptron, draw: Drawn, random: np.random.Generator
+) -> tuple[AnyArray, AnyArray]:
+    """Solve the last layer, ``(in, out)`` and ``(out,)``, by weighted least squares over fresh rows."""
     products: FloatArray = np.zeros(())
     targets: FloatArray = np.zeros(())
     for _ in range(_SOLVED):
@@ -90,5 +104,4 @@ def _solved(network: EncodedPerceptron, draw: Drawn, random: np.random.Generator
         products, targets = products + weighted.T @ features, targets + weighted.T @ wanted
     ridge = _RIDGE * float(np.trace(products)) / len(products)
     last = np.linalg.solve(products + ridge * np.eye(len(products)), targets)
-    inner = network.weights().layers[:-1]
-    return MlpWeights((*inner, (last[:-1], last[-1])))
+    return last[:-1], last[-1]

@@ -6,10 +6,9 @@ from experiments.baselines.settings import FitSpec
 from experiments.baselines.sound.bench import SEED, StrikeBench
 from experiments.baselines.sound.spectrogram import INPUTS, OUTPUTS, SpectrumBasis, spectrum_pair
 from experiments.baselines.training.fit import fitted
+from harness.authoring.published.modules import exported_graph
 from harness.authoring.training import Report
 from harness.basics.arrays import AnyArray, FloatArray
-from harness.objectfile.graph import Encoding, Normaliser
-from harness.objectfile.published.graphs import perceptron_graph_of
 
 _UNIFORM = 0.5
 """Share of bins that are drawn anywhere; the others where sounds have their energy, at less weight each."""
@@ -51,16 +50,14 @@ def train_spectrogram(bench: StrikeBench, spec: FitSpec, report: Report) -> byte
     """The graph of the trained network."""
     basis = SpectrumBasis.of(bench)
     rows = SpectrumRows(bench, basis, spec.batch)
-    weights = fitted(
-        spec, (INPUTS, OUTPUTS), rows, SEED, lambda share: report("audio: training 1.0's network", share)
+    network = fitted(
+        spec,
+        (INPUTS, OUTPUTS),
+        rows,
+        SEED,
+        lambda share: report("audio: training 1.0's network", share),
+        rows.scale,
     )
-    as_it_is = Normaliser(np.zeros(INPUTS), np.ones(INPUTS))
-    encoding = Encoding.octaves(spec.octaves)
-    graph = perceptron_graph_of(
-        spectrum_pair(),
-        [weights.scaled(rows.scale)],
-        as_it_is,
-        "A bin of a strike's spectrum, as in 1.0.",
-        encoding,
-    )
-    return graph.SerializeToString()
+    taken, given = spectrum_pair()
+    doc = "A bin of a strike's spectrum, as in 1.0."
+    return exported_graph(network, (taken,), (given,), doc).SerializeToString()

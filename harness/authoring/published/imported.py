@@ -5,9 +5,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from harness.authoring.published.container import read_container, sha256_of
 from harness.authoring.published.layout import FileTable, format_of
 from harness.authoring.published.look import take_first_look, take_look
+from harness.authoring.published.reader import read_container, sha256_of
 from harness.authoring.published.senses import (
     ImportedParts,
     take_colours,

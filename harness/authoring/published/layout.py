@@ -1,4 +1,4 @@
-"""A published file's tables, read by their names: what is missing or of another shape is refused."""
+"""Tables and weights of a published file, read by name; what is missing or has another shape is refused."""
 
 import math
 from collections.abc import Mapping
@@ -9,17 +9,12 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused
-from harness.objectfile.graph import MlpWeights
 from harness.objectfile.published.entries import Format
 
 _PREFIX = "module."
-"""That torch's DataParallel puts before every name."""
+"""Prefix that torch's DataParallel puts before every name."""
 
-_LAYERS = 8
-_SKIP = 5
-"""The layer, from 0, that takes the encoded input again, of sound and touch of both versions."""
-
-DEAD = "views_linears."
+_UNUSED = "views_linears."
 """Layers that the published networks of sound and touch are saved with and never use."""
 
 
@@ -28,15 +23,15 @@ class FileTable:
     """A table of the file.
 
     Attributes:
-        name: where it is, for messages.
-        values: of it.
+        name: path of the table in the file, for messages.
+        values: entries by name.
     """
 
     name: str
     values: Mapping[str, Any]
 
     def part(self, key: str) -> "FileTable":
-        """A table within; ``DataRefused`` where there is none."""
+        """Return a table within; ``DataRefused`` where there is none."""
         found = self.values.get(key)
         if not isinstance(found, Mapping):
             raise DataRefused(
@@ -45,7 +40,7 @@ class FileTable:
         return FileTable(f"{self.name}/{key}", found)
 
     def array(self, key: str, shape: tuple[int | None, ...]) -> FloatArray:
-        """Finite numbers of a shape, None for any size from 1 up, float64; ``DataRefused`` for others."""
+        """Return finite numbers of a shape, None for any size from 1 up; ``DataRefused`` for others."""
         value = self.values.get(key)
         if not isinstance(value, np.ndarray | int | float | list):
             raise DataRefused(
@@ -53,12 +48,8 @@ class FileTable:
             )
         return checked(value, shape, f"{self.name}/{key}")
 
-    def number(self, key: str) -> float:
-        """One finite number."""
-        return float(self.numbers(key, 1)[0])
-
     def numbers(self, key: str, count: int) -> FloatArray:
-        """``(count,)`` float64, of one number for all, or of as many in any shape."""
+        """Return ``(count,)`` float64 from one number for all, or from as many in any shape."""
         value = self.values.get(key)
         if not isinstance(value, np.ndarray | int | float | list) or isinstance(value, bool):
             raise DataRefused(
@@ -69,17 +60,49 @@ class FileTable:
             raise DataRefused(f"{self.name}/{key} has {flat.size} numbers, where there is 1, or {count}")
         return np.array(np.broadcast_to(flat, (count,)))
 
+    def number(self, key: str) -> float:
+        """Return one finite number."""
+        return float(self.numbers(key, 1)[0])
 
-def checked(value: Any, shape: tuple[int | None, ...], name: str) -> FloatArray:
-    """Finite float64 of a shape; ``DataRefused`` for others, or for text."""
+    def whole(self, key: str, most: int, least: int = 1) -> int:
+        """Return a whole number within limits; ``DataRefused`` for others."""
+        number = self.number(key)
+        if number != round(number) or not least <= number <= most:
+            raise DataRefused(f"{self.name}/{key} is {number:g}, not a whole number from {least} to {most}")
+        return int(number)
+
+    def sizes(self, key: str, most: int) -> tuple[int, int, int]:
+        """Return whole numbers along x, y and z, from 1; ``DataRefused`` for others."""
+        x, y, z = self.array(key, (3,)).tolist()
+        if not all(size == round(size) and 1 <= size <= most for size in (x, y, z)):
+            raise DataRefused(f"{self.name}/{key} is {[x, y, z]}, not three whole numbers from 1 to {most}")
+        return int(x), int(y), int(z)
+
+    def flag(self, key: str) -> bool:
+        """Return true or false, which is what a missing one is."""
+        value = self.values.get(key, False)
+        if not isinstance(value, bool | int):
+            raise DataRefused(f"{self.name}/{key} is {value!r}, where true or false belongs")
+        return bool(value)
+
+
+def checked(
+    value: Any, shape: tuple[int | None, ...], name: str, kind: type[np.floating[Any]] = np.float64
+) -> FloatArray:
+    """Convert to finite numbers of a shape; ``DataRefused`` for other shapes, or for text."""
     try:
         array = np.asarray(value)
     except ValueError as error:
         raise DataRefused(f"{name} is no array") from error
-    if array.dtype.kind not in "fiub" or not _fits(array.shape, shape):
+    fits = len(array.shape) == len(shape) and all(
+        size >= 1 if wanted is None else size == wanted
+        for size, wanted in zip(array.shape, shape, strict=True)
+    )
+    if array.dtype.kind not in "fiub" or not fits:
         wanted = " x ".join("n" if size is None else str(size) for size in shape) or "one number"
         raise DataRefused(f"{name} holds {array.dtype} {array.shape}, where {wanted} belongs")
-    numbers = array.astype(np.float64)
+    with np.errstate(over="ignore", under="ignore"):
+        numbers: FloatArray = array.astype(kind)
     if not np.isfinite(numbers).all():
         bad = int(np.count_nonzero(~np.isfinite(numbers)))
         raise DataRefused(
@@ -89,7 +112,7 @@ def checked(value: Any, shape: tuple[int | None, ...], name: str) -> FloatArray:
 
 
 def format_of(tree: Any, name: str) -> Format:
-    """Which version published it.
+    """Determine which version published a file.
 
     Raises:
         DataRefused: neither.
@@ -116,20 +139,19 @@ def format_of(tree: Any, name: str) -> Format:
     if len(found) != 1:
         raise DataRefused(
             f"{name} has {', '.join(senses)} of {' and '.join(sorted(found)) or 'no known layout'}; an "
-            "ObjectFile is "
-            "of one version, 1.0 or 2.0"
+            "ObjectFile is of one version, 1.0 or 2.0"
         )
     return found.pop()
 
 
 @dataclass(eq=False)
 class State:
-    """The weights of a network, by name; names that nobody asked for are not dropped in silence.
+    """The weights of a network by name; names that no layer reads are reported, not ignored.
 
     Attributes:
-        name: where it is, for messages.
-        values: by names without torch's prefix.
-        used: names that were asked for.
+        name: path of the weights in the file, for messages.
+        values: arrays by name, without torch's prefix.
+        used: names that were read.
     """
 
     name: str
@@ -138,7 +160,7 @@ class State:
 
     @classmethod
     def of(cls, part: FileTable, key: str) -> "State":
-        """The state of a key.
+        """Return the weights of a key.
 
         The prefix goes where every name has it, and then wherever it stands, as in the published programs.
         """
@@ -151,53 +173,31 @@ class State:
             raise DataRefused(f"{table.name} has two weights of one name behind {_PREFIX!r}")
         return cls(table.name, values)
 
-    def has(self, prefix: str) -> bool:
-        """Whether a name begins so."""
-        return any(name.startswith(prefix) for name in self.values)
+    def array(self, name: str, axes: int) -> AnyArray:
+        """Return the float32 weights of a name; numbers too small for normal float32 become zero."""
+        if name not in self.values:
+            raise DataRefused(f"{self.name} has no {name!r}; it is no network as ObjectFolder publishes them")
+        self.used.add(name)
+        array = checked(self.values[name], (None,) * axes, f"{self.name}/{name}", np.float32)
+        # Subnormal weights are noise, and slow every product they enter.
+        array[np.abs(array) < np.finfo(np.float32).smallest_normal] = 0.0
+        return array
 
-    def weights(self, layer: str, dimensions: int) -> tuple[AnyArray, AnyArray]:
-        """``weight`` and ``bias`` of a layer as they are held: so many axes and one less."""
-        found = []
-        for kind, axes in (("weight", dimensions), ("bias", dimensions - 1)):
-            name = f"{layer}.{kind}"
-            if name not in self.values:
-                raise DataRefused(
-                    f"{self.name} has no {name!r}; it is no network as ObjectFolder publishes them"
-                )
-            self.used.add(name)
-            found.append(checked(self.values[name], (None,) * axes, f"{self.name}/{name}").astype(np.float32))
-        return found[0], found[1]
+    def outputs(self, layer: str, axes: int = 1) -> int:
+        """Return the number of outputs of a layer, whose bias has so many axes."""
+        return int(self.array(f"{layer}.bias", axes).shape[-1])
 
-    def linear(self, layer: str) -> tuple[AnyArray, AnyArray]:
-        """``(in, out)`` and ``(out,)`` of a torch layer, which holds ``(out, in)``."""
-        weight, bias = self.weights(layer, 2)
-        return weight.T, bias
-
-    def perceptron(self, prefix: str = "") -> MlpWeights:
-        """The published perceptron: eight layers, the input again at the sixth, and the output."""
-        layers = [self.linear(f"{prefix}pts_linears.{k}") for k in range(_LAYERS)]
-        return MlpWeights((*layers, self.linear(f"{prefix}output_linear")), (_SKIP,))
-
-    def dropped(self) -> dict[str, int]:
-        """Numbers that nothing uses, by name.
+    def unused(self) -> dict[str, int]:
+        """Count the numbers that nothing uses, by name.
 
         Raises:
-            DataRefused: others than the known dead layers: a layout that is not known.
+            DataRefused: others than the known unused layers: a layout that is not known.
         """
         rest = [name for name in self.values if name not in self.used]
-        foreign = [name for name in rest if DEAD not in name]
+        foreign = [name for name in rest if _UNUSED not in name]
         if foreign:
             raise DataRefused(
                 f"{self.name} has weights {foreign[:3]} that the published program does not know; it is of "
-                "another "
-                "layout, and reading the rest would be a guess"
+                "another layout, and reading the rest would be a guess"
             )
         return {f"{self.name}/{name}": math.prod(np.shape(self.values[name])) for name in rest}
-
-
-def _fits(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
-    if len(found) != len(shape):
-        return False
-    return all(
-        size >= 1 if wanted is None else size == wanted for size, wanted in zip(found, shape, strict=True)
-    )

@@ -1,48 +1,40 @@
-"""Sound and touch of a published file as tables and graphs of ours."""
+"""Sound and touch of a published file as tables of ``object.json`` and exported networks."""
 
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from harness.authoring.published.layout import FileTable, State
 from harness.basics.arrays import AnyArray, FloatArray
-from harness.basics.errors import DataRefused, WrongUse
-from harness.objectfile.entries import NetworkEntry
+from harness.basics.errors import DataRefused
+from harness.objectfile.entries import Domain, Input, NetworkEntry, Tensor
 from harness.objectfile.file import file_entry
-from harness.objectfile.graph import MlpWeights, Normaliser
 from harness.objectfile.network_part import NetworkPart, network_entry
 from harness.objectfile.npy_file import npy_bytes
 from harness.objectfile.published.entries import Bounds
-from harness.objectfile.published.graphs import perceptron_graph_of
-from harness.objectfile.published.tensors import (
-    PRESSED,
-    SEEN,
+from harness.objectfile.published.touch import (
+    DEPTH_PIXELS,
+    PRESS_DEPTH,
+    SEEN_DEPTH,
     TILT,
-    Pair,
-    colours_tensors,
-    depth_tensors,
-    gains_tensors,
-    spectrum_tensors,
+    normalised_coordinates,
 )
-from harness.objectfile.published.touch import normalised_coordinates
+from harness.objectfile.vision_tensors import graph_input
 
-AUDIO, TOUCH, VOXELS = "audio.onnx", "touch.onnx", "audio_voxels.npy"
+_AUDIO, _TOUCH, _VOXELS = "audio.onnx", "touch.onnx", "audio_voxels.npy"
 
-TOLERANCE = 1e-4
-"""Of a self-test, of the greatest number: as for networks of ours."""
+_TOLERANCE = 1e-4
+"""Tolerance of a self-test, relative to the greatest number: as for networks of ours."""
 
-_AXES = ("x", "y", "z")
 _TESTED = 4
 """Queries of a self-test."""
-
-_T = TypeVar("_T")
 
 
 @dataclass(eq=False)
 class ImportedParts:
-    """What is gathered while a file is read.
+    """Parts gathered while a file is read.
 
     Attributes:
         tree: tables of ``object.json``.
@@ -56,17 +48,36 @@ class ImportedParts:
     dropped: dict[str, int] = field(default_factory=dict)
     missing: list[str] = field(default_factory=list)
 
+    def network(
+        self,
+        file: str,
+        module: Any,
+        inputs: tuple[Input, ...],
+        outputs: tuple[Tensor, ...],
+        doc: str,
+        asked: Mapping[str, AnyArray],
+    ) -> NetworkEntry:
+        """Export a module into the contents.
 
-def refusing(where: str, build: Callable[[], _T]) -> _T:
-    """What is built; layers that do not fit together are the file's fault and ``DataRefused``."""
-    try:
-        return build()
-    except WrongUse as error:
-        raise DataRefused(f"{where}: {error}") from error
+        Args:
+            file: name of the graph's file.
+            module: torch module.
+            inputs: the module's inputs, in order.
+            outputs: the module's outputs, in order.
+            doc: description stored in the graph.
+            asked: inputs of the self-test.
+
+        Raises:
+            DataRefused: a graph that must not be run.
+        """
+        from harness.authoring.published.modules import exported_graph
+
+        graph = exported_graph(module, inputs, outputs, doc)
+        return network_entry(NetworkPart(file, graph, inputs, outputs, asked, _TOLERANCE), self.contents)
 
 
 def take_gains(audio: FileTable, into: ImportedParts) -> None:
-    """The sound of version 2.0.
+    """Read the sound of version 2.0.
 
     Raises:
         DataRefused: tables or layers that are missing or do not fit together.
@@ -75,53 +86,45 @@ def take_gains(audio: FileTable, into: ImportedParts) -> None:
     frequencies, dampings = (audio.array(key, (None,)) for key in ("frequencies", "dampings"))
     modes = len(frequencies)
     low, high = (normaliser.numbers(key, 3) for key in ("xyz_min", "xyz_max"))
-    branches = [
-        _scaled(
-            state.perceptron(f"model_{axis}."),
-            *_range(normaliser, f"f{k}", modes),
-            f"model_{axis} of {state.name}",
-        )
-        for k, axis in enumerate(_AXES, start=1)
-    ]
-    into.dropped |= state.dropped()
-    tensors = gains_tensors(modes, low, high)
-    doc = (
-        "Points (n, 3), m, to gains of modes for a unit force along x, y, z (n, m, 3); from a published file."
-    )
-    box = refusing(normaliser.name, lambda: Normaliser.unit_box(low, high))
-    entry = _network(AUDIO, tensors, branches, box, (low, high), doc, into)
+    _require_extent(low, high, normaliser.name)
+    box = Domain(low=tuple(low.tolist()), high=tuple(high.tolist()))
+    points = graph_input("points", "float64", ("n", 3), "m", "where the object is struck", box, "mesh")
+    gains = Tensor(
+        name="gains", dtype="float32", shape=("n", modes, 3), unit="not stated by the file", frame="mesh",
+        meaning="gain of each mode for a unit force along x, y, z",
+    )  # fmt: skip
     into.tree["audio_gains"] = {
         "frequencies_hz": frequencies.tolist(),
         "dampings_per_s": dampings.tolist(),
         "low_m": low.tolist(),
         "high_m": high.tolist(),
-        "network": entry,
+        "network": _perceptrons(
+            into, _AUDIO, points, gains, state, _ranges(normaliser, modes), low, 1.0 / (high - low)
+        ),
     }
     into.missing.append("the unit of the gains, so that sounds have no absolute loudness")
 
 
 def take_spectra(audio: FileTable, bounds: Bounds | None, into: ImportedParts) -> None:
-    """The sound of version 1.0; ``DataRefused`` as ``take_gains``."""
+    """Read the sound of version 1.0; ``DataRefused`` as ``take_gains``."""
     state, normaliser = State.of(audio, "model_state_dict"), audio.part("normalizer")
-    branches = [
-        _scaled(
-            state.perceptron(f"model_{axis}."),
-            *_range(normaliser, f"f{k}", 1),
-            f"model_{axis} of {state.name}",
-        )
-        for k, axis in enumerate(_AXES, start=1)
-    ]
-    into.dropped |= state.dropped()
-    into.contents[VOXELS] = npy_bytes(audio.array("voxel_vertex", (None, 3)), "<f8")
-    plain, span = Normaliser(np.zeros(5), np.ones(5)), (np.zeros(5), np.ones(5))
-    doc = "Normalised voxel, frequency and time (n, 5) to a spectrum for unit forces along x, y, z (n, 2, 3)."
-    entry = _network(AUDIO, spectrum_tensors(), branches, plain, span, doc, into)
+    box = Domain(low=(0.0,) * 5, high=(1.0,) * 5)
+    place = graph_input(
+        "place", "float64", ("n", 5), "1", "x y z of a voxel, frequency, time: 0 to 1", box, "mesh"
+    )
+    spectrum = Tensor(
+        name="spectrum", dtype="float32", shape=("n", 2, 3), unit="not stated by the file", frame="mesh",
+        meaning="real and imaginary part, for a unit force along x, y, z",
+    )  # fmt: skip
+    into.contents[_VOXELS] = npy_bytes(audio.array("voxel_vertex", (None, 3)), "<f8")
     into.tree["audio_spectrum"] = {
-        "voxels": file_entry(VOXELS, into.contents[VOXELS]),
+        "voxels": file_entry(_VOXELS, into.contents[_VOXELS]),
         "translation": audio.numbers("translation", 3).tolist(),
         "scale": audio.number("scale"),
         "bounds": bounds,
-        "network": entry,
+        "network": _perceptrons(
+            into, _AUDIO, place, spectrum, state, _ranges(normaliser, 1), np.zeros(5), np.ones(5)
+        ),
     }
     if bounds is None:
         into.missing.append(
@@ -130,29 +133,28 @@ def take_spectra(audio: FileTable, bounds: Bounds | None, into: ImportedParts) -
 
 
 def take_depths(touch: FileTable, into: ImportedParts) -> None:
-    """The touch of version 2.0; ``DataRefused`` as ``take_gains``."""
+    """Read the touch of version 2.0; ``DataRefused`` as ``take_gains``."""
     state = State.of(touch, "model_state_dict")
     low, high = (touch.numbers(key, 3) for key in ("xyz_min", "xyz_max"))
-    weights = state.perceptron()
-    into.dropped |= state.dropped()
-    tensors = depth_tensors(low, high)
-    domain = tensors[0].domain
-    least, most = np.array(domain.low), np.array(domain.high)
-    box = refusing(touch.name, lambda: Normaliser.unit_box(least, most))
-    shift, factor = box.shift.copy(), box.factor.copy()
+    _require_extent(low, high, touch.name)
+    rows, columns = DEPTH_PIXELS
+    least = np.array([*low, 0.0, -1.0, -1.0, PRESS_DEPTH[0], 0.0, 0.0])
+    most = np.array([*high, TILT, 1.0, 1.0, PRESS_DEPTH[1], rows - 1.0, columns - 1.0])
+    domain = Domain(low=tuple(least.tolist()), high=tuple(most.tolist()))
+    meaning = "x y z, m; tilt, rad; cosine and sine of its azimuth; depth of the press, m; row; column"
+    pixel = graph_input("pixel", "float64", ("n", 9), "m, rad, 1 and pixels", meaning, domain, "mesh")
+    seen = "from the gel's camera to its surface"
+    depth = Tensor(name="depth", dtype="float32", shape=("n", 1), unit="m", meaning=seen)
+    shift, factor = least.copy(), 1.0 / (most - least)
     shift[4:6], factor[4:6] = 0.0, 1.0  # cosine and sine stay as they are
-    near, far = SEEN
-    doc = (
-        "x y z tilt cos sin depth row column (n, 9) to m from the gel's camera (n, 1); from a published file."
-    )
-    scaled = _scaled(weights, np.array([far - near]), np.array([near]), state.name)
-    entry = _network(TOUCH, tensors, [scaled], Normaliser(shift, factor), (least, most), doc, into)
+    near, far = SEEN_DEPTH
+    branch = ("", np.array([far - near]), np.array([near]))
     into.tree["touch_depth"] = {
         "low_m": low.tolist(),
         "high_m": high.tolist(),
         "most_tilt_rad": TILT,
-        "depth_m": PRESSED,
-        "network": entry,
+        "depth_m": PRESS_DEPTH,
+        "network": _perceptrons(into, _TOUCH, pixel, depth, state, [branch], shift, factor),
     }
     into.missing += [
         "the limits of tilt, depth of press and distance from the camera: they are the published program's",
@@ -162,53 +164,78 @@ def take_depths(touch: FileTable, into: ImportedParts) -> None:
 
 
 def take_colours(touch: FileTable, bounds: Bounds | None, into: ImportedParts) -> None:
-    """The touch of version 1.0; ``DataRefused`` as ``take_gains``."""
+    """Read the touch of version 1.0; ``DataRefused`` as ``take_gains``."""
     state = State.of(touch, "model_state_dict")
-    weights = state.perceptron()
-    into.dropped |= state.dropped()
-    most = (
-        1.0 if bounds is None else max(1.0, float(normalised_coordinates(np.array([bounds[1]]), bounds)[0]))
+    greatest = 1.0
+    if bounds is not None:
+        greatest = max(1.0, float(normalised_coordinates(np.array([bounds[1]]), bounds)[0]))
+    box = Domain(low=(-1.0,) * 5, high=(greatest, greatest, greatest, 1.0, 1.0))
+    place = graph_input("place", "float64", ("n", 5), "1", "x y z; row and column, -1 to 1", box, "mesh")
+    colours = Tensor(
+        name="colours", dtype="float32", shape=("n", 3), unit="1", meaning="red green blue, -1 to 1"
     )
-    plain, span = Normaliser(np.zeros(5), np.ones(5)), (-np.ones(5), np.ones(5))
-    doc = "Normalised place, row and column (n, 5) to red green blue, -1 to 1 (n, 3); from a published file."
-    entry = _network(TOUCH, colours_tensors(most), [weights], plain, span, doc, into)
-    into.tree["touch_colours"] = {"bounds_m": bounds, "network": entry}
+    into.tree["touch_colours"] = {
+        "bounds_m": bounds,
+        "network": _perceptrons(
+            into, _TOUCH, place, colours, state, [("", np.ones(1), np.zeros(1))], np.zeros(5), np.ones(5)
+        ),
+    }
     if bounds is None:
         into.missing.append(
             "the bounds that vertices were normalised by: the touch refuses until they are given"
         )
 
 
-def _range(normaliser: FileTable, key: str, count: int) -> tuple[FloatArray, FloatArray]:
-    """Factor and offset of an output that was trained between 0 and 1."""
-    low, high = (normaliser.numbers(f"{key}_{end}", count) for end in ("min", "max"))
-    return high - low, low
+_Branch = tuple[str, FloatArray, FloatArray]
+"""Prefix of a perceptron's names, and the factor and offset of its outputs."""
 
 
-def _scaled(weights: MlpWeights, factor: AnyArray, offset: AnyArray, where: str) -> MlpWeights:
-    if len(factor) not in (1, weights.outputs):
-        raise DataRefused(
-            f"{where} has {weights.outputs} outputs, where its modes and normaliser have {len(factor)}"
-        )
-    return weights.scaled(factor, offset)
+def _ranges(normaliser: FileTable, count: int) -> list[_Branch]:
+    """Branches for unit forces along x, y and z, whose outputs were trained between 0 and 1."""
+    branches = []
+    for number, axis in enumerate("xyz", start=1):
+        low, high = (normaliser.numbers(f"f{number}_{end}", count) for end in ("min", "max"))
+        branches.append((f"model_{axis}.", high - low, low))
+    return branches
 
 
-def _network(
-    file: str,
-    tensors: Pair,
-    branches: list[MlpWeights],
-    normaliser: Normaliser,
-    span: tuple[FloatArray, FloatArray],
-    doc: str,
+def _require_extent(low: FloatArray, high: FloatArray, name: str) -> None:
+    if not (high > low).all():
+        raise DataRefused(f"{name}: a box from {low} to {high} has no extent along some axis")
+
+
+def _perceptrons(
     into: ImportedParts,
+    file: str,
+    taken: Input,
+    given: Tensor,
+    state: State,
+    branches: Sequence[_Branch],
+    shift: FloatArray,
+    factor: FloatArray,
 ) -> NetworkEntry:
-    """The entry of a network, its bytes among the contents; ``span`` is where its self-test lies."""
-    taken, given = tensors
-    low, high = span
-    asked = {taken.name: low + np.random.default_rng(0).random((_TESTED, len(low))) * (high - low)}
+    """Export perceptrons with one input, normalised as ``(input - shift) * factor``.
 
-    def build() -> NetworkEntry:
-        graph = perceptron_graph_of(tensors, branches, normaliser, doc)
-        return network_entry(NetworkPart(file, graph, (taken,), (given,), asked, TOLERANCE), into.contents)
+    Raises:
+        DataRefused: layers that do not fit together, or as many outputs as neither modes nor normaliser have.
+    """
+    from harness.authoring.published.modules import Perceptron, ScaledPerceptrons, load_weights
 
-    return refusing(file, build)
+    modules, outputs, count = [], int(given.shape[1]), len(shift)
+    for prefix, _, _ in branches:
+        width, ends = state.outputs(f"{prefix}pts_linears.0"), state.outputs(f"{prefix}output_linear")
+        if ends != outputs:
+            raise DataRefused(
+                f"{prefix}output_linear of {state.name} has {ends} outputs, where its modes and normaliser "
+                f"have {outputs}"
+            )
+        modules.append(Perceptron(count * 21, width, outputs))
+        load_weights(modules[-1], state, prefix)
+    into.dropped |= state.unused()
+    scales, offsets = (np.stack([branch[k] for branch in branches]) for k in (1, 2))
+    network = ScaledPerceptrons(modules, shift, factor, scales, offsets)
+    # The self-test's queries are spread over the domain, in the network's own range 0 .. 1 for most inputs.
+    low, high = np.array(taken.domain.low), np.array(taken.domain.high)
+    asked = {taken.name: low + np.random.default_rng(0).random((_TESTED, count)) * (high - low)}
+    doc = f"{taken.meaning}, to {given.meaning}; from a published file."
+    return into.network(file, network, (taken,), (given,), doc, asked)

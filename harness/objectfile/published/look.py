@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from harness.basics.errors import DataRefused
+from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.npy_file import npy_array
 from harness.objectfile.published.camera import PublishedView
 from harness.objectfile.published.entries import PublishedCellsEntry, PublishedVisionEntry
@@ -15,12 +17,37 @@ from harness.objectfile.published.query import query
 from harness.objectfile.published.volume_render import render_rays, stretched_sigmoid
 from harness.objectfile.runtime import Network
 from harness.objectfile.self_test import open_network
+from harness.objectfile.vision_tensors import graph_input
 
 _BLOCKS = 256
 """Blocks in one run of cells: their weights are gathered for it, 20 MB of them."""
 
 _RIM = 1e-3
 """Within the cube's faces, in which nothing is taken to be."""
+
+
+def osf_tensors(reach: float) -> tuple[tuple[Input, ...], tuple[Tensor, ...]]:
+    """Describe the inputs and outputs of one network whose points lie within ``reach`` of the origin."""
+    within, unit = Domain(low=(-reach,) * 3, high=(reach,) * 3), Domain(low=(-1.0,) * 3, high=(1.0,) * 3)
+    light = "as trained: unit, the light's direction"
+    inputs = (
+        graph_input("points", "float64", ("n", 3), "1", "where", within, "vision"),
+        graph_input("views", "float32", ("n", 3), "1", "unit, from the camera", unit, "vision"),
+        graph_input("light", "float32", ("n", 3), "1", light, unit, "vision"),
+    )
+    return inputs, raw_look_tensors(("n",))
+
+
+def raw_look_tensors(rows: tuple[int | Literal["n"], ...]) -> tuple[Tensor, ...]:
+    """Describe raw colour and density, whose shapes begin with ``rows``."""
+    meanings = (
+        ("colour_raw", 3, "red green blue before the sigmoid"),
+        ("density_raw", 1, "density before it is cut off at zero"),
+    )
+    return tuple(
+        Tensor(name=name, dtype="float32", shape=(*rows, size), unit="1", meaning=meaning)
+        for name, size, meaning in meanings
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from harness.basics.errors import CalibrationRefused
-from harness.objectfile.published.tensors import SEEN
+from harness.objectfile.published.touch import SEEN_DEPTH
 from harness.sim.optics.published_pack import PRESSES, TABLE, read_published, read_table
 
 PITCH = 0.1245e-3
@@ -64,7 +64,7 @@ class TaximPicture:
             depth: ``(rows, columns)`` m from the camera.
             pressed: m, depth of the press.
         """
-        height = (SEEN[1] - depth) / PITCH
+        height = (SEEN_DEPTH[1] - depth) / PITCH
         contact = height - self.rest > _CORE * pressed / PITCH
         found: FloatArray = np.clip(
             table_colours(_skirted(height, contact), self.table) + self.base, 0.0, 255.0

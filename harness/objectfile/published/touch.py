@@ -13,6 +13,19 @@ from harness.objectfile.published.query import query, require_in_box
 from harness.objectfile.runtime import Network
 from harness.objectfile.self_test import open_network
 
+TILT = math.radians(15.0)
+"""rad: the greatest tilt of a press; with the depths and distances below it is in the published program
+(``OF_render.py``) and not in its files."""
+
+PRESS_DEPTH = (0.5e-3, 2.0e-3)
+"""m: least and greatest depth of a press."""
+
+SEEN_DEPTH = (33.9e-3, 40.0e-3)
+"""m from camera to gel: what the network's 0 and 1 stand for."""
+
+DEPTH_PIXELS = (120, 160)
+"""Rows and columns of a map of 2.0."""
+
 _ROUNDING = 1e-9
 """Relative, of an angle or depth at its limit."""
 

@@ -40,9 +40,10 @@ def import_published(
 ) -> int:
     """Read a published ObjectFile (ObjectFolder 1.0 or 2.0) into a folder of ONNX networks and object.json.
 
-    Nothing in the file is run: tensors and numbers are read, anything else is refused. It needs torch, which
-    is in the extra `author`; the folder needs none. What the file does not hold is listed, and not guessed:
-    bounds of 1.0 are given with --audio-bounds and --touch-bounds, or that sense refuses to be queried.
+    Nothing in the file is run: tensors and numbers are read, anything else is refused. It needs torch and
+    onnxscript, which are in the extra `author`; the folder needs neither. What the file does not hold is
+    listed, and not guessed: bounds of 1.0 are given with --audio-bounds and --touch-bounds, or that sense
+    refuses to be queried.
 
     Try: touchstone object import ObjectFile.pth --out objects/published_mug
     """

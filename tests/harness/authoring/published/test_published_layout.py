@@ -7,14 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.authoring.published.cell_look import needed_cells
 from harness.authoring.published.imported import gathered, import_published
 from harness.authoring.published.layout import format_of
+from harness.authoring.published.look import needed_cells
 from harness.basics.errors import DataRefused, WrongUse
 from tests.samples import published_trees
 from tests.samples.published_files import write_published
+from tests.samples.published_objects import committed_object
 
 Tree = dict[str, Any]
+
+
+def with_torch() -> None:
+    for name in ("torch", "onnxscript"):
+        pytest.importorskip(name, reason="the extra `author` is not installed")
 
 
 def refused(tree: Tree) -> str:
@@ -49,18 +55,19 @@ def test_senses_of_two_versions_are_no_objectfile() -> None:
 
 
 def test_a_sense_that_is_not_there_is_said() -> None:
-    tree = published_trees.second()
-    del tree["TouchNet"]
+    with_torch()
+    tree = {"TouchNet": published_trees.second()["TouchNet"]}
     parts = gathered(tree, "a file", "ObjectFolder 2.0", None, None)
-    assert "touch_depth" not in parts.tree
-    assert any("TouchNet" in sentence for sentence in parts.missing)
+    assert "touch_depth" in parts.tree
+    for sense in ("AudioNet", "VisionNet"):
+        assert any(sense in sentence for sentence in parts.missing)
 
 
 def test_layers_that_nothing_uses_are_dropped_and_counted() -> None:
-    parts = gathered(published_trees.second(), "a file", "ObjectFolder 2.0", None, None)
-    assert len(parts.dropped) == 2 * 4
-    assert all("views_linears" in name for name in parts.dropped)
-    assert sum(parts.dropped.values()) == 4 * (20 * 10 + 10)
+    dropped = committed_object("kilo").description.dropped
+    assert len(dropped) == 2 * 4
+    assert all("views_linears" in name for name in dropped)
+    assert sum(dropped.values()) == 4 * (8 * 4 + 4)
 
 
 def _gone(tree: Tree) -> None:
@@ -117,31 +124,48 @@ def _disparity(tree: Tree) -> None:
 
 
 @pytest.mark.parametrize(
-    ("damage", "named"),
+    ("damage", "sense", "named"),
     [
-        (_gone, "model_y.pts_linears.3.bias"),
-        (_unknown, "gate.weight"),
-        (_not_finite, "not finite"),
-        (_transposed, "layer 5"),
-        (_other_modes, "f1_min has 7 numbers"),
-        (_flat, "no extent"),
-        (_text, "near"),
-        (_half_a_sample, "num_samples_per_ray"),
-        (_other_cells, "32 cells"),
-        (_huge, "resolution"),
-        (_empty, "empty"),
-        (_disparity, "disparity"),
+        (_other_modes, "AudioNet", "f1_min has 7 numbers"),
+        (_flat, "AudioNet", "no extent"),
+        (_text, "VisionNet", "near"),
+        (_half_a_sample, "VisionNet", "num_samples_per_ray"),
+        (_huge, "VisionNet", "resolution"),
+        (_empty, "VisionNet", "empty"),
+        (_disparity, "VisionNet", "disparity"),
     ],
 )
-def test_what_does_not_fit_is_refused_by_its_place(damage: Callable[[Tree], None], named: str) -> None:
+def test_what_does_not_fit_is_refused_by_its_place(
+    damage: Callable[[Tree], None], sense: str, named: str
+) -> None:
     tree = published_trees.second()
     damage(tree)
-    assert named in refused(tree)
+    assert named in refused({sense: tree[sense]})
+
+
+@pytest.mark.parametrize(
+    ("damage", "sense", "named"),
+    [
+        (_gone, "AudioNet", "model_y.pts_linears.3.bias"),
+        (_unknown, "TouchNet", "gate.weight"),
+        (_not_finite, "TouchNet", "not finite"),
+        (_transposed, "TouchNet", "pts_linears.5"),
+        (_other_cells, "VisionNet", "32 cells"),
+    ],
+)
+def test_weights_that_do_not_fit_are_refused_by_their_name(
+    damage: Callable[[Tree], None], sense: str, named: str
+) -> None:
+    with_torch()
+    tree = published_trees.second()
+    damage(tree)
+    assert named in refused({sense: tree[sense]})
 
 
 def test_modes_without_dampings_of_their_own_are_refused(tmp_path: Path) -> None:
-    pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
+    with_torch()
     tree = published_trees.second()
+    tree = {"AudioNet": tree["AudioNet"]}
     _fewer_dampings(tree)
     path = write_published(tree, tmp_path / "ObjectFile.pth")
     with pytest.raises(DataRefused, match="7 frequencies, 6 dampings"):

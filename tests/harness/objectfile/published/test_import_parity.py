@@ -1,5 +1,11 @@
-"""Imported networks against the published formulas in float64: every head, to 1e-5 of its greatest number."""
+"""Imported networks against the published formulas in float64: every head, to 1e-5 of its greatest number.
 
+The folders of the exporter and of the importer before it are committed; where torch is installed the same
+files are imported again.
+"""
+
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,31 +18,46 @@ from harness.objectfile.published.look import open_look
 from harness.objectfile.published.sound import COMPAT_RATE, compat_sounds, open_gains, open_spectra
 from harness.objectfile.published.touch import open_colours, open_depths
 from tests.oracles import objectfolder_formulas as formulas
-from tests.samples import published_trees
-from tests.samples.published_objects import imported_object
+from tests.samples.published_objects import (
+    AUDIO_BOUNDS,
+    TOUCH_BOUNDS,
+    TREES,
+    committed_object,
+    import_tree,
+)
 
 CLOSE = 1e-5
 BOX = np.array([-0.06, -0.05, 0.01]), np.array([0.05, 0.09, 0.12])
-BOUNDS = (2.0, 21.0)
-TOUCHED = (-0.07, 0.13)
+
+Imported = tuple[dict[str, Any], PublishedObject]
+
+MADE = [
+    f"{by}: {name}" for by in ("exported", "hand_built", "now") for name in ("kilo", "osf", "first")
+    if (by, name) != ("hand_built", "osf")
+]  # fmt: skip
+"""Folders that were imported by the exporter, by the importer before it, and by this test where torch is."""
+
+
+def of_kind(*names: str) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("imported", [made for made in MADE if made.endswith(names)], indirect=True)
 
 
 @pytest.fixture(scope="module")
-def second(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], PublishedObject]:
-    tree = published_trees.second()
-    return tree, imported_object(tree, tmp_path_factory.mktemp("second") / "kilo")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], PublishedObject]:
+    @cache
+    def find(made: str) -> PublishedObject:
+        by, name = made.split(": ")
+        if by != "now":
+            return committed_object(name, by)
+        pytest.importorskip("onnxscript", reason="the extra `author` is not installed")
+        return import_tree(name, tmp_path_factory.mktemp("now") / name)
+
+    return find
 
 
-@pytest.fixture(scope="module")
-def second_osf(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], PublishedObject]:
-    tree = published_trees.second(1, prefix="", vectors=False, kilo=False)
-    return tree, imported_object(tree, tmp_path_factory.mktemp("second") / "osf")
-
-
-@pytest.fixture(scope="module")
-def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], PublishedObject]:
-    tree = published_trees.first(2)
-    return tree, imported_object(tree, tmp_path_factory.mktemp("first") / "mug", audio=BOUNDS, touch=TOUCHED)
+@pytest.fixture
+def imported(request: pytest.FixtureRequest, opened: Callable[[str], PublishedObject]) -> Imported:
+    return TREES[request.param.split(": ")[1]](), opened(request.param)
 
 
 def points(count: int, seed: int = 5) -> FloatArray:
@@ -55,23 +76,21 @@ def apart(found: AnyArray, wanted: AnyArray) -> float:
     return float(np.abs(found - wanted).max() / np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("which", ["second", "second_osf"])
-def test_gains_of_modes_are_those_of_the_published_formulas(
-    which: str, request: pytest.FixtureRequest
-) -> None:
-    tree, of = request.getfixturevalue(which)
+@of_kind("kilo", "osf")
+def test_gains_of_modes_are_those_of_the_published_formulas(imported: Imported) -> None:
+    tree, of = imported
     entry = of.description.audio_gains
+    assert entry is not None
     found = open_gains(of, entry).at(points(9))
     wanted = np.stack([formulas.gains(tree["AudioNet"], point) for point in points(9)])
     for axis in range(3):
         assert apart(found[..., axis], wanted[..., axis]) < CLOSE
 
 
-@pytest.mark.parametrize("which", ["second", "second_osf"])
-def test_distances_of_the_gel_are_those_of_the_published_formulas(
-    which: str, request: pytest.FixtureRequest
-) -> None:
-    tree, of = request.getfixturevalue(which)
+@of_kind("kilo", "osf")
+def test_distances_of_the_gel_are_those_of_the_published_formulas(imported: Imported) -> None:
+    tree, of = imported
+    assert of.description.touch_depth is not None
     vertices, gel = points(2), np.array([[0.1, 2.3, 0.7e-3], [0.25, -1.0, 1.9e-3]])
     maps = open_depths(of, of.description.touch_depth).maps(vertices, gel)
     assert maps.shape == (2, 120, 160)
@@ -80,10 +99,9 @@ def test_distances_of_the_gel_are_those_of_the_published_formulas(
     assert apart(np.array([maps[place] for place in at]) - 0.0339, np.array(wanted) - 0.0339) < CLOSE
 
 
-def test_one_network_of_a_look_is_that_of_the_published_formulas(
-    second_osf: tuple[dict[str, Any], PublishedObject],
-) -> None:
-    tree, of = second_osf
+@of_kind("osf")
+def test_one_network_of_a_look_is_that_of_the_published_formulas(imported: Imported) -> None:
+    tree, of = imported
     look, state = of.description.vision, tree["VisionNet"]["model_state_dict"]
     assert look is not None
     places, views, light = (
@@ -102,10 +120,9 @@ def test_one_network_of_a_look_is_that_of_the_published_formulas(
         assert apart(found[:, 3], wanted[:, 3]) < CLOSE
 
 
-def test_the_networks_of_cells_are_those_of_the_published_formulas(
-    second: tuple[dict[str, Any], PublishedObject],
-) -> None:
-    tree, of = second
+@of_kind("kilo")
+def test_the_networks_of_cells_are_those_of_the_published_formulas(imported: Imported) -> None:
+    tree, of = imported
     assert of.description.vision is not None
     places = np.random.default_rng(0).uniform(-0.61, 0.61, (300, 3))
     views, light = directions(300), directions(1, 8)[0]
@@ -121,10 +138,9 @@ def test_the_networks_of_cells_are_those_of_the_published_formulas(
     assert apart(found[:, 3], wanted[:, 3]) < CLOSE
 
 
-def test_spectra_of_version_1_are_those_of_the_published_formulas(
-    first: tuple[dict[str, Any], PublishedObject],
-) -> None:
-    tree, of = first
+@of_kind("first")
+def test_spectra_of_version_1_are_those_of_the_published_formulas(imported: Imported) -> None:
+    tree, of = imported
     assert of.description.audio_spectrum is not None
     sound = open_spectra(of, of.description.audio_spectrum)
     point = np.array([0.02, 0.03, 0.12])
@@ -132,31 +148,29 @@ def test_spectra_of_version_1_are_those_of_the_published_formulas(
     solid = tree["AudioNet"]["voxel_vertex"]
     far = np.linalg.norm(solid - (point + np.array([0.1, 0.05, 0.0])) * 4.0 * 32, axis=1)
     assert {tuple(voxel) for voxel in voxels} == {tuple(voxel) for voxel in solid[np.argsort(far)[:4]]}
-    found = sound.spectrum((voxels[0] - BOUNDS[0]) / (BOUNDS[1] - BOUNDS[0]))
+    found = sound.spectrum((voxels[0] - AUDIO_BOUNDS[0]) / (AUDIO_BOUNDS[1] - AUDIO_BOUNDS[0]))
     at = [(0, 0), (256, 200), (3, 150), (200, 9), (77, 78)]
-    wanted = np.stack([formulas.spectrum(tree["AudioNet"], voxels[0], BOUNDS, place) for place in at])
+    wanted = np.stack([formulas.spectrum(tree["AudioNet"], voxels[0], AUDIO_BOUNDS, place) for place in at])
     assert apart(np.stack([found[place] for place in at]), wanted) < CLOSE
 
 
-def test_colours_of_version_1_are_those_of_the_published_formulas(
-    first: tuple[dict[str, Any], PublishedObject],
-) -> None:
-    tree, of = first
+@of_kind("first")
+def test_colours_of_version_1_are_those_of_the_published_formulas(imported: Imported) -> None:
+    tree, of = imported
     assert of.description.touch_colours is not None
     touch = open_colours(of, of.description.touch_colours)
     vertices = points(2)
     images = touch.images(vertices)
     assert images.shape == (2, 160, 120, 3)
     for n, row, column in [(0, 0, 0), (0, 159, 2), (1, 5, 119), (1, 80, 60)]:
-        wanted = formulas.colour(tree["TouchNet"], vertices[n], TOUCHED, row, column)
+        wanted = formulas.colour(tree["TouchNet"], vertices[n], TOUCH_BOUNDS, row, column)
         grey = np.clip((wanted + 1) / 2 * 255, 0, 255)
         assert np.abs(images[n, row, column] - grey).max() <= 0.5 + 255 * CLOSE * np.abs(wanted).max()
 
 
-def test_both_networks_of_a_look_of_version_1_are_those_of_the_published_formulas(
-    first: tuple[dict[str, Any], PublishedObject],
-) -> None:
-    tree, of = first
+@of_kind("first")
+def test_both_networks_of_a_look_of_version_1_are_those_of_the_published_formulas(imported: Imported) -> None:
+    tree, of = imported
     assert of.description.vision is not None
     places, views, light = (
         np.random.default_rng(0).uniform(-1.0, 1.0, (3, 3)),
@@ -174,8 +188,9 @@ def test_both_networks_of_a_look_of_version_1_are_those_of_the_published_formula
         assert apart(network.raw(places, views, light), wanted) < CLOSE
 
 
-def test_a_compatible_sound_is_the_published_programs(second: tuple[dict[str, Any], PublishedObject]) -> None:
-    tree, of = second
+@of_kind("kilo")
+def test_a_compatible_sound_is_the_published_programs(imported: Imported) -> None:
+    tree, of = imported
     assert of.description.audio_gains is not None
     sound = open_gains(of, of.description.audio_gains)
     force = np.array([0.3, -1.0, 2.0])
@@ -184,10 +199,9 @@ def test_a_compatible_sound_is_the_published_programs(second: tuple[dict[str, An
     assert np.abs(found - formulas.ring(tree["AudioNet"], points(1)[0], force)).max() < CLOSE
 
 
-def test_a_spectrum_becomes_the_sound_that_overlapped_windows_make(
-    first: tuple[dict[str, Any], PublishedObject],
-) -> None:
-    _, of = first
+@of_kind("first")
+def test_a_spectrum_becomes_the_sound_that_overlapped_windows_make(imported: Imported) -> None:
+    _, of = imported
     assert of.description.audio_spectrum is not None
     random = np.random.default_rng(0)
     spectrum = random.normal(size=(257, 201)) + 1j * random.normal(size=(257, 201))
@@ -196,10 +210,11 @@ def test_a_spectrum_becomes_the_sound_that_overlapped_windows_make(
     assert apart(found, formulas.inverse_stft(spectrum)) < 1e-12
 
 
-@pytest.mark.parametrize("which", ["second", "second_osf"])
-def test_a_compatible_picture_is_the_published_programs(which: str, request: pytest.FixtureRequest) -> None:
-    tree, of = request.getfixturevalue(which)
+@of_kind("kilo", "osf")
+def test_a_compatible_picture_is_the_published_programs(imported: Imported) -> None:
+    tree, of = imported
     look, size, eye, light = of.description.vision, 6, np.array([1.2, -1.5, 1.6]), np.array([0.0, -0.6, 0.8])
+    assert look is not None
     eye *= 2.5 / np.linalg.norm(eye)
     view = views_of(np.array([[*eye, *light]]), 1.04, compat=True)[0]
     found = open_look(of, look).picture(view, size, 0.0)

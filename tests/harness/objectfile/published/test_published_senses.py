@@ -1,6 +1,8 @@
 """What imported senses promise beyond the formulas: domains, loudness, company, refusals of damage."""
 
 import json
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.published.folder import PublishedObject
-from harness.objectfile.published.look import open_look
+from harness.objectfile.published.look import CellNetworks, open_look
 from harness.objectfile.published.sound import (
     PublishedGains,
     compat_sounds,
@@ -21,19 +23,18 @@ from harness.objectfile.published.sound import (
 from harness.objectfile.published.taxim_picture import TaximPicture, table_colours
 from harness.objectfile.published.touch import PublishedColours, PublishedDepths, open_colours, open_depths
 from harness.objectfile.verify.verify import verify_published
-from tests.samples import published_trees
 from tests.samples.object_bench import egg_file
-from tests.samples.published_objects import imported_object
+from tests.samples.published_objects import committed_object, without_bounds
 
 
 @pytest.fixture(scope="module")
-def second(tmp_path_factory: pytest.TempPathFactory) -> PublishedObject:
-    return imported_object(published_trees.second(), tmp_path_factory.mktemp("published") / "mug")
+def second() -> PublishedObject:
+    return committed_object("kilo")
 
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory: pytest.TempPathFactory) -> PublishedObject:
-    return imported_object(published_trees.first(), tmp_path_factory.mktemp("published") / "old")
+    return without_bounds(tmp_path_factory.mktemp("published") / "old")
 
 
 def gains(of: PublishedObject) -> PublishedGains:
@@ -122,12 +123,11 @@ def test_a_look_answers_a_point_alike_in_any_company(second: PublishedObject) ->
     assert apart == pytest.approx(together, rel=1e-5, abs=1e-5)
 
 
-def test_a_thousandth_within_the_faces_of_its_cube_a_look_is_empty(tmp_path: Path) -> None:
-    tree = published_trees.second()
-    tree["VisionNet"]["occupancy_grid"] = np.ones_like(tree["VisionNet"]["occupancy_grid"])
-    of = imported_object({"VisionNet": tree["VisionNet"]}, tmp_path / "mug")
-    assert of.description.vision is not None
-    field = open_look(of, of.description.vision).coarse.raw
+def test_a_thousandth_within_the_faces_of_its_cube_a_look_is_empty(second: PublishedObject) -> None:
+    assert second.description.vision is not None
+    cells = open_look(second, second.description.vision).coarse
+    assert isinstance(cells, CellNetworks)
+    field = replace(cells, networks=np.zeros_like(cells.networks), occupied=None).raw
     inward = np.array([0.0, 0.9e-3, 1.1e-3, 0.1])
     for axis in range(3):
         for side in (-1.0, 1.0):
@@ -148,12 +148,12 @@ def test_a_sense_of_version_1_without_bounds_refuses_in_one_sentence(first: Publ
 
 
 def test_with_the_querys_bounds_a_touch_depends_on_its_company_and_with_given_ones_not(
-    first: PublishedObject, tmp_path: Path
+    first: PublishedObject,
 ) -> None:
     near, far = np.array([[0.01, 0.02, 0.03]]), np.array([[0.01, 0.02, 0.03], [0.05, 0.05, 0.12]])
     alone, company = (colours(first).images(vertices, of_query=True)[0] for vertices in (near, far))
     assert not np.array_equal(alone, company)
-    known = colours(imported_object(published_trees.first(), tmp_path / "known", touch=(0.0, 0.13)))
+    known = colours(committed_object("first"))
     assert np.array_equal(known.images(near)[0], known.images(far)[0])
     with pytest.raises(OutOfDomain, match="press 0"):
         known.images(np.array([[0.0, 0.0, 0.2]]))
@@ -217,7 +217,7 @@ def test_a_folder_of_either_kind_is_not_taken_for_the_other(second: PublishedObj
 
 
 def test_everything_of_an_imported_folder_is_verified_and_damage_is_found(tmp_path: Path) -> None:
-    of = imported_object(published_trees.second(1, kilo=False), tmp_path / "mug")
+    of = PublishedObject.open(shutil.copytree(committed_object("osf").folder, tmp_path / "mug"))
     assert all(check.passed for check in verify_published(of))
     path = of.folder / "vision_fine.onnx"
     data = bytearray(path.read_bytes())

@@ -11,8 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.authoring.published.container import Budget, plain_tree, read_container
-from harness.authoring.published.stand_ins import ALLOWED, PickledArray, PickledDtype
+from harness.authoring.published.reader import (
+    ALLOWED,
+    Budget,
+    PickledArray,
+    PickledDtype,
+    plain_tree,
+    read_container,
+)
 from harness.basics.errors import DataRefused, TouchstoneError, WrongUse
 from harness.cli import invoke
 from tests.samples import published_trees
@@ -20,7 +26,8 @@ from tests.samples.published_files import write_published
 
 
 def with_torch() -> Any:
-    return pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
+    pytest.importorskip("onnxscript", reason="the extra `author` is not installed")
+    return pytest.importorskip("torch", reason="the extra `author` is not installed")
 
 
 class Unpickler(pickle.Unpickler):

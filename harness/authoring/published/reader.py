@@ -1,20 +1,23 @@
-"""A file of torch as plain tables of numpy arrays. Reading it runs nothing of what is in it.
+"""Read a file of torch as plain tables of numpy arrays, without running anything in it.
 
-torch's own restricted reader (``weights_only``) makes tensors, dictionaries and numbers; numpy's arrays, of
-which published files have some, are made by ``stand_ins``. Any other name in the file is refused.
+torch's own restricted reader (``weights_only``) makes tensors, dictionaries and numbers. Published files also
+hold numpy arrays, which a pickle builds by calling numpy's constructors and passing a state. numpy's own
+constructors would take any dtype, objects and padded structures among them; the stand-ins below take
+little-endian numbers and booleans, as many bytes as their shape has. Any other name in the file is refused.
 """
 
 import hashlib
+import math
 import pickle
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from harness.authoring.published.stand_ins import ALLOWED, PickledArray
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.files.foreign_file import MOST_DATA, refused_as, require_readable, require_unpackable
@@ -74,12 +77,13 @@ def _require_archive(path: Path) -> None:
 
 
 def _loaded(path: Path) -> Any:
-    try:
-        import torch
-    except ImportError as error:
+    if any(find_spec(name) is None for name in ("torch", "onnxscript")):
         raise WrongUse(
-            "reading a .pth file needs torch, which is in the extra `author`: pip install '.[author]'"
-        ) from error
+            "importing a .pth file needs torch and onnxscript, which are in the extra `author`: pip install "
+            "'.[author]'"
+        )
+    import torch
+
     try:
         with torch.serialization.safe_globals(list(ALLOWED)):
             return torch.load(path, map_location="cpu", weights_only=True)
@@ -169,3 +173,77 @@ def _of_tensor(tensor: Any, where: str, budget: Budget) -> AnyArray:
             f"{where} is a tensor that is no plain array ({_reason(error)}); {_FOREIGN}"
         ) from error
     return array
+
+
+_CODES = frozenset({"b1", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8"})
+
+MOST_NUMBERS = 2**28
+"""Of one array; the largest published one has 17 million."""
+
+
+class PickledDtype:
+    """A dtype of plain numbers (``numpy.dtype(code, align, copy)``)."""
+
+    def __init__(self, code: Any, *_: Any) -> None:
+        if code not in _CODES:
+            raise pickle.UnpicklingError(f"numbers of the kind {code!r}")
+        self.dtype = np.dtype("<" + code)
+
+    def __setstate__(self, state: Any) -> None:
+        order = state[1] if isinstance(state, tuple) and len(state) > 1 else None
+        if order not in ("<", "|", "="):
+            raise pickle.UnpicklingError(f"numbers of the byte order {order!r}")
+
+
+class PickledArray:
+    """An array of plain numbers, made empty (``numpy.core.multiarray._reconstruct``) and filled by its state.
+
+    Attributes:
+        array: None before.
+    """
+
+    def __init__(self, *_: Any) -> None:
+        self.array: AnyArray | None = None
+
+    def __setstate__(self, state: Any) -> None:
+        if not (isinstance(state, tuple) and len(state) == 5 and isinstance(state[2], PickledDtype)):
+            raise pickle.UnpicklingError("an array whose state is none")
+        _, shape, kind, fortran, data = state
+        self.array = _filled(shape, kind, data, "F" if fortran else "C")
+
+
+def scalar(kind: Any, data: Any) -> Any:
+    """``numpy.core.multiarray.scalar``: one number, as Python's."""
+    if not isinstance(kind, PickledDtype):
+        raise pickle.UnpicklingError("a scalar without a kind")
+    return _filled((), kind, data, "C").item()
+
+
+class ArrayName:
+    """``numpy.ndarray``, as ``PickledArray`` is given it: a name, not to be called."""
+
+    def __new__(cls, *_: Any) -> "ArrayName":
+        """Refuse."""
+        raise pickle.UnpicklingError("an array made by its class")
+
+
+ALLOWED: tuple[tuple[Any, str], ...] = (
+    (PickledArray, "numpy.core.multiarray._reconstruct"),
+    (PickledArray, "numpy._core.multiarray._reconstruct"),
+    (scalar, "numpy.core.multiarray.scalar"),
+    (scalar, "numpy._core.multiarray.scalar"),
+    (PickledDtype, "numpy.dtype"),
+    (ArrayName, "numpy.ndarray"),
+)
+"""What a published file may name beside torch's own tensors, and what is called instead."""
+
+
+def _filled(shape: Any, kind: PickledDtype, data: Any, order: Any) -> AnyArray:
+    sizes = isinstance(shape, tuple) and all(
+        type(size) is int and 0 <= size <= MOST_NUMBERS for size in shape
+    )
+    if not sizes or not isinstance(data, bytes) or math.prod(shape) > MOST_NUMBERS:
+        raise pickle.UnpicklingError(f"an array of the shape {shape!r}")
+    if len(data) != math.prod(shape) * kind.dtype.itemsize:
+        raise pickle.UnpicklingError(f"{len(data)} bytes for an array {shape!r} of {kind.dtype}")
+    return np.frombuffer(data, kind.dtype).reshape(shape, order=order)
