@@ -1,11 +1,13 @@
 """The model of a scene's object: with its modes where the scene is to be heard."""
 
 from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from experiments.contact_localization.model import Model
-from harness.basics.errors import MeshRefused
+from harness.basics.errors import MeshRefused, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
@@ -14,12 +16,14 @@ from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
 from harness.effects.explain import without_sound
-from harness.effects.file_levels import scene_levels
+from harness.effects.file_levels import NETWORK, scene_levels
+from harness.effects.scene_object import known_file
+from harness.effects.touch_file_effects import SHAPES
 from harness.experiment.object_modes import ReadFile, carried_by, object_modes
-from harness.experiment.object_touch import object_touch
 from harness.recording.run_folder import RunFiles
 from harness.sim.modal.modes import Modes
 from harness.sim.optics.tactile_calibration import TactileCalibration
+from harness.sim.solid.walls import walled
 
 
 def model_of_run(run: RunFiles, accuracy: Accuracy | None = None) -> Model:
@@ -80,3 +84,50 @@ def _refuse_loose(modes: Modes) -> None:
             f"{loose} of the object's {len(modes.frequencies)} modes have no stiffness: parts of it hang "
             "together by an edge or a point only; join them by faces"
         )
+
+
+if TYPE_CHECKING:
+    from harness.objectfile.touch.tool_depth import CodedDepth
+
+
+def object_touch(
+    scene: SceneFile,
+    station: Station,
+    mesh: Mesh,
+    calibration: TactileCalibration,
+    accuracy: Accuracy,
+    objectfile: ReadFile | None = None,
+) -> "CodedDepth | None":
+    """What candidates' tactile images are crops of; None where the mesh is drawn.
+
+    Args:
+        scene: says the wall, and may name an ObjectFile.
+        station: gives the sensor.
+        mesh: of the object, in metres.
+        calibration: of the gel.
+        accuracy: its level of ``touch.shapes``.
+        objectfile: reads the object's; None for the one that the scene names.
+
+    Raises:
+        WrongUse: a level that answers no candidates; or no ObjectFile, or one of another object or gel.
+        DataRefused: an ObjectFile without that touch, or a damaged one.
+    """
+    level = accuracy.of(SHAPES)
+    if level == SHAPES.default:
+        return None
+    if level != NETWORK:
+        raise WrongUse(
+            f"{SHAPES.name} = {level}: it answers single presses, of no yaw, where an estimate compares "
+            f"thousands; take {SHAPES.name} = {NETWORK} or {SHAPES.default}"
+        )
+    of = (objectfile or partial(known_file, scene, mesh))()
+    if of is None:
+        raise WrongUse(
+            f"{SHAPES.name} = {level}: the scene names no ObjectFile; name one with --object FOLDER, or take "
+            f"{SHAPES.name} = {SHAPES.default}"
+        )
+    # Graphs are loaded by those alone who take touch from an ObjectFile.
+    from harness.objectfile.touch.level import tool_depth_from
+
+    solid = walled(mesh, scene.object.wall)
+    return tool_depth_from(of, solid, station.gel.sensor, calibration.header.skirt)

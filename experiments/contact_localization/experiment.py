@@ -3,20 +3,16 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from experiments.contact_localization.accuracy.benchmark_runs import performed, preparations
+from experiments.contact_localization.accuracy.benchmark_runs import Cell, cells, performed, preparations
 from experiments.contact_localization.accuracy.budget import BUDGETS
-from experiments.contact_localization.accuracy.cells import Cell, cells
 from experiments.contact_localization.accuracy.dials import KNOBS, setting_name, settings, settings_by_count
-from experiments.contact_localization.accuracy.paper import PAPER_CM
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
-from experiments.contact_localization.accuracy.table_cell import HEARD, METHODS, run_cell
+from experiments.contact_localization.accuracy.table import HEARD, METHODS, PAPER_CM, run_cell
 from experiments.contact_localization.answer import ContactAnswering
-from experiments.contact_localization.choosing.next_contact import ChosenContacts
-from experiments.contact_localization.lines import answer_lines
+from experiments.contact_localization.next_contact import ChosenContacts
 from experiments.contact_localization.plan import plan
-from experiments.contact_localization.report.comparison import GIVES, sources
-from experiments.contact_localization.report.report import write
-from experiments.contact_localization.report.result import result_of
+from experiments.contact_localization.report.report import GIVES, sources, write
+from experiments.contact_localization.report.result import answer_lines, result_of
 from experiments.contact_localization.section import Localization
 from harness.bench.scene import SceneFile
 from harness.bench.station import Bench

@@ -1,6 +1,6 @@
 """A localization's contacts, planned and rehearsed."""
 
-from experiments.contact_localization.choosing.next_contact import PLACEHOLDER
+from experiments.contact_localization.next_contact import PLACEHOLDER
 from experiments.contact_localization.section import Localization
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh

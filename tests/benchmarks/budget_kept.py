@@ -23,8 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.benchmark_runs import Case, performed
-from experiments.contact_localization.accuracy.cells import Cell, cells
+from experiments.contact_localization.accuracy.benchmark_runs import Case, Cell, cells, performed
 from experiments.contact_localization.accuracy.dials import needs_sound
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, Models
 from experiments.contact_localization.experiment import EXPERIMENT

@@ -7,9 +7,8 @@ from typing import Any
 
 import pytest
 
-from experiments.contact_localization.accuracy.benchmark_runs import Case
+from experiments.contact_localization.accuracy.benchmark_runs import Case, cells
 from experiments.contact_localization.accuracy.budget import shipped_curve
-from experiments.contact_localization.accuracy.cells import cells
 from experiments.contact_localization.accuracy.dials import (
     FINEST,
     KNOBS,

@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.cells import Cell, scene_of
+from experiments.contact_localization.accuracy.benchmark_runs import Cell, scene_of
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.posterior.estimate import Estimate
 from harness.basics.arrays import ByteArray, FloatArray

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from experiments.contact_localization.observation import contact_of
+from experiments.contact_localization.accuracy.solving import contact_of
 from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.touch.touch import TouchNoise
 from harness.basics.arrays import FloatArray

@@ -1,6 +1,7 @@
 """Runs on the mocked bench, performed in process and kept in memory, to be answered at any setting."""
 
 import gc
+import itertools
 import json
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor, Future
@@ -14,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.accuracy.budget import Run
-from experiments.contact_localization.accuracy.cells import Cell, scene_of
 from experiments.contact_localization.accuracy.dials import HEARD, needs_images
 from experiments.contact_localization.accuracy.solving import (
     PROGRAM,
@@ -53,6 +53,67 @@ from harness.recording.step_file import Step, StepRecord
 from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Which run.
+
+    Attributes:
+        object: its name in the table.
+        spacing: ``"close"`` or ``"spread"``.
+        gap: ``"default"`` or ``"none"``.
+        yaw: ``"known"`` to the estimator or ``"unknown"``.
+        seed: of the sites, the world and the draws.
+        sound: whether every place is struck too.
+        choose: ``"planned"`` contacts, or ``"active"`` ones, chosen one by one.
+    """
+
+    object: str
+    spacing: str
+    gap: str
+    yaw: str
+    seed: int
+    sound: bool = False
+    choose: str = "planned"
+
+    @property
+    def conditions(self) -> dict[str, str]:
+        """What was varied."""
+        return {"spacing": self.spacing, "gap": self.gap, "yaw": self.yaw, "choose": self.choose}
+
+    @property
+    def name(self) -> str:
+        """Of the cell's file; a gap may be a path."""
+        gap = self.gap.replace("/", "_")
+        plain = f"{self.object}-{self.spacing}-{gap}-{self.yaw}-{self.seed}"
+        heard = f"{plain}-sound" if self.sound else plain
+        return heard if self.choose == "planned" else f"{heard}-{self.choose}"
+
+
+def scene_of(cell: Cell, scene: SceneFile) -> SceneFile:
+    """The scene of a run: the object turned by an angle of the run's own."""
+    turned = np.random.default_rng((cell.seed, 7)).uniform(0.0, 360.0)
+    tree = scene.model_dump(mode="json", by_alias=True)
+    tree.setdefault("localization", {}).update(spacing=cell.spacing, choose=cell.choose)
+    tree["object"]["pose"]["yaw"] = f"{turned:.3f} deg"
+    tree["sensors"]["sound"] = cell.sound
+    return scene_from_json(tree, "the table")
+
+
+def cells(
+    objects: Sequence[str],
+    seeds: Sequence[int],
+    spacings: Sequence[str],
+    gaps: Sequence[str],
+    yaws: Sequence[str],
+    sound: bool = False,
+    choices: Sequence[str] = ("planned",),
+) -> list[Cell]:
+    """Every run of a table, one seed of every object before the next: a table that is stopped is even."""
+    varied = itertools.product(yaws, gaps, spacings, choices, objects)
+    first = [Cell(o, spacing, gap, yaw, 0, sound, choose) for yaw, gap, spacing, choose, o in varied]
+    return [replace(cell, seed=seed) for seed in seeds for cell in first]
 
 
 @dataclass(frozen=True, eq=False)

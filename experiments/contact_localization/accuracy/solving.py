@@ -7,19 +7,13 @@ from typing import TypeVar
 
 from numba.core.event import install_recorder
 
-from experiments.contact_localization.accuracy.dials import (
-    SIMULATED,
-    accuracy_at,
-    needs_images,
-    needs_sound,
-)
+from experiments.contact_localization.accuracy.dials import SIMULATED, accuracy_at, needs_images, needs_sound
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import contact_of, height_map
-from experiments.contact_localization.posterior.bench_noise import noise_at
 from experiments.contact_localization.posterior.dials import BLOCK, METHOD, ROUNDS, SAMPLES, SPACING
-from experiments.contact_localization.posterior.estimate import Estimate, locate
-from experiments.contact_localization.posterior.hypotheses import Contact, Noise
-from experiments.contact_localization.posterior.strain import times_stated
+from experiments.contact_localization.posterior.estimate import Estimate, locate, times_stated
+from experiments.contact_localization.posterior.hypotheses import Contact
+from experiments.contact_localization.posterior.noise import Noise, noise_at
+from experiments.contact_localization.touch.touch import TouchNoise, touch_map
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.bench.bench_errors import BenchErrors
@@ -27,6 +21,7 @@ from harness.effects.accuracy import Accuracy, Level, Setting
 from harness.effects.touch_file_effects import SHAPES as TOUCH
 from harness.experiment.solving import Solved
 from harness.recording.observation import Observation
+from harness.sim.optics.inverse import heights_or_refusal
 
 T = TypeVar("T")
 
@@ -257,3 +252,25 @@ def _contacts(readings: Readings, block: int, noise: Noise, images: bool) -> lis
         else contact_of(observation.base_from_gel, heights, pitch, block, noise.touch)
         for index, (observation, heights) in enumerate(pairs)
     ]
+
+
+CONTACT_THRESHOLD = 0.12e-3
+"""Metres of indentation, averaged over a compared pixel, below which no contact is seen."""
+
+
+def contact_of(
+    base_from_gel: FloatArray, heights: FloatArray, pitch: float, block: int, noise: TouchNoise
+) -> Contact:
+    """A contact from its pose ``(4, 4)`` and its height map in metres at ``pitch`` metres a pixel."""
+    fine = touch_map(heights, pitch, block, noise.skirt, noise.edge, CONTACT_THRESHOLD)
+    # A contact of one fine pixel is still seen in the four times larger one that holds it.
+    coarse = touch_map(heights, pitch, 2 * block, noise.skirt, noise.edge, 0.25 * CONTACT_THRESHOLD)
+    return Contact(base_from_gel, fine, coarse)
+
+
+def height_map(observation: Observation, model: Model) -> tuple[FloatArray, str]:
+    """``(rows, columns)`` metres of indentation, from the mean of the contact's frames, and no text.
+
+    Zeros, and why, where the picture is not what the calibration was made of.
+    """
+    return heights_or_refusal(observation.images, model.calibration)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
+from experiments.contact_localization.posterior.noise import SAME_AXIS, SAME_PLACE
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.touch.contact_scales import SAME_AXIS, SAME_PLACE
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import FitRefused
 

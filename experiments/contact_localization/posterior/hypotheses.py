@@ -1,12 +1,10 @@
 """What the search is about: contacts, places they may have been, and how noisy everything is."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from experiments.contact_localization.posterior.likelihood import GeometryNoise
-from experiments.contact_localization.posterior.shared_errors import SharedNoise
-from experiments.contact_localization.touch.touch import TouchMap, TouchNoise
+from experiments.contact_localization.touch.touch import TouchMap
 from harness.basics.arrays import FloatArray, IntArray
 
 _GOLDEN = 0.6180339887498949
@@ -58,7 +56,7 @@ class Hypotheses:
         gels: ``(n, 3)`` metres, in the object's frame.
         yaws: ``(n,)`` rad away from the nominal one.
         log_weights: ``(n,)`` nats, the greatest 0.
-        shared: ``(n, 6)`` errors that all contacts share (``shared_errors``); None where not named.
+        shared: ``(n, 6)`` errors that all contacts share (``noise.SharedNoise``); None where not named.
         log_drawn: ``(n,)`` nats, up to a constant: the density that each was drawn from, by one over which
             it is weighed; None where all were drawn alike.
     """
@@ -112,28 +110,6 @@ class Hypotheses:
         density = self.log_weights if self.log_drawn is None else self.log_weights + self.log_drawn
         best = int(np.argmax(density))
         return self.taken(np.array([best], dtype=np.int64), np.zeros(1))
-
-
-@dataclass(frozen=True)
-class Noise:
-    """The noise of every term, as measured on calibration runs.
-
-    Attributes:
-        geometry: of places and tool axes.
-        unread: the same where no image is read: how far the gel was pressed in, and past which edge, is not
-            known there, so that the surface met may face elsewhere than the one that was aimed at.
-        touch: of the images.
-        temperature: factor on the images' share: their errors are shared between contacts.
-        shared: of what all contacts share, and of what is left to each where that is named.
-        floor: factor on what regions are widened by beside the hypotheses' own spread (``estimate.FLOORS``).
-    """
-
-    geometry: GeometryNoise = field(default_factory=GeometryNoise)
-    unread: GeometryNoise = field(default_factory=lambda: GeometryNoise(gap=1.2e-3, angle=np.radians(4.0)))
-    touch: TouchNoise = field(default_factory=TouchNoise)
-    temperature: float = 0.8
-    shared: SharedNoise = field(default_factory=SharedNoise)
-    floor: float = 1.0
 
 
 def anchors(members: IntArray, most: int) -> IntArray:

@@ -11,11 +11,17 @@ from dataclasses import replace
 import numpy as np
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, Noise, best_of
+from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, best_of
 from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores, possible_anchors
-from experiments.contact_localization.posterior.shared_errors import log_prior, moves
-from experiments.contact_localization.touch.attitude import turns_between
-from experiments.contact_localization.touch.contact_scales import cap_of, contact_scales, place_noise
+from experiments.contact_localization.posterior.noise import (
+    Noise,
+    cap_of,
+    contact_scales,
+    log_prior,
+    moves,
+    place_noise,
+)
+from experiments.contact_localization.touch.kernels import turns_between
 from experiments.contact_localization.touch.touch import TouchMap, best_fit, touch_terms
 from harness.basics.arrays import FloatArray, IntArray
 from harness.bench.bench_errors import USUAL

@@ -1,44 +1,85 @@
 """Fill the report of a run from its folder, its answer and, for a mocked run, its truth."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from experiments.contact_localization.accuracy.dials import accuracy_at, by_sound, grid, particles
+from experiments.contact_localization.accuracy.solving import Readings, loaded, prepare, solve
+from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.answer import Answer as Found
-from experiments.contact_localization.choosing.next_contact import EXPECTED
+from experiments.contact_localization.next_contact import EXPECTED
 from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.dials import METHOD, Senses
 from experiments.contact_localization.posterior.dials import SENSES as BY
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.report.comparison import object_from_gels
 from experiments.contact_localization.report.result import by_translations, flags_of, true_points
 from experiments.contact_localization.report.sound_report import posterior_of, sound_of
-from experiments.contact_localization.report.sweep import SweepPoint, trade
-from experiments.contact_localization.report.twin_check import deviations
 from experiments.contact_localization.section import Localization
-from harness.basics.arrays import FloatArray
+from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import FitRefused
-from harness.basics.geometry import inverse
+from harness.basics.geometry import inverse, rotation_from_quaternion, transform, translation
 from harness.bench.device import Health
-from harness.effects.accuracy import Accuracy
+from harness.effects.accuracy import Accuracy, Setting
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
 from harness.recording.run_folder import RunFiles
-from harness.report.data import (
-    AnswerRow,
-    BenchScene,
-    ContactRow,
-    ErrorCurve,
-    ReportData,
-)
+from harness.report.data import AnswerRow, BenchScene, ContactRow, ErrorCurve, ReportData, TwinDeviation
 from harness.report.figures.props import arm_parts, object_part, sensor_parts, table_and_pedestal
 from harness.report.page import write_report
 from harness.report.run_page import facts_of
 from harness.report.simulated import NO_TRUTH
 from harness.report.values import Missing
 from harness.report.wording import SENSES
+from harness.skills.press import ContactMotion
+from harness.twin.bench_of import twin_of
+from harness.twin.compare import compare_arm, compare_contact
+from harness.twin.rehearsal import predict_contact
+
+
+@dataclass(frozen=True)
+class SweepPoint:
+    """One level of accuracy on one recording.
+
+    Attributes:
+        name: of the level.
+        accuracy: the dials.
+        seconds_a_contact: of the estimate, samples of the surface prepared.
+        error: m, of the last contact.
+    """
+
+    name: str
+    accuracy: Accuracy
+    seconds_a_contact: float
+    error: float
+
+
+LEVELS: dict[str, Setting] = {
+    "4 mm, no refinement": grid("both", 4e-3, 0, 3000, 8),
+    "3 mm, no refinement": grid("both", 3e-3, 0, 3000, 8),
+    "2 mm, no refinement": grid("both", 2e-3, 0, 3000, 8),
+    "2 mm, refined once": grid("both", 2e-3, 1, 3000, 8),
+    "2 mm, refined": grid("both", 2e-3, 5, 3000, 8),
+    "1.5 mm, refined": grid("both", 1.5e-3, 5, 6000, 8),
+    "300 particles": particles(300, 2e-3, 8),
+    "1,000 particles": particles(1000, 2e-3, 8),
+    "3,000 particles": particles(3000, 2e-3, 8),
+}
+"""What the report tries, by name, from cheap to exact for each method; `touchstone cost` tries more."""
+
+
+BY_SENSE: dict[str, Setting] = {
+    "touch: 4 mm, no refinement": grid("touch", 4e-3, 0, 3000, 8),
+    "touch: 2 mm, no refinement": grid("touch", 2e-3, 0, 3000, 8),
+    "touch: 2 mm, refined": grid("touch", 2e-3, 5, 3000, 8),
+    "sound: 4 mm": by_sound(4e-3),
+    "sound: 2 mm": by_sound(2e-3),
+}
+"""What is tried beside where contacts were struck, so that each sense is seen alone."""
 
 
 def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path) -> Path:
@@ -243,3 +284,86 @@ def _ours(scored: Scored) -> dict[str, str]:
         "optics_level, the comparison's": str(scored.accuracy.get("touch.optics", "")),
         "calibration_sha256, the estimator's": scored.run.calibration.sha256,
     }
+
+
+def trade(readings: Readings, true: FloatArray) -> tuple[SweepPoint, ...]:
+    """Estimate the same readings again at every level; a level that refuses the fit is left out.
+
+    Args:
+        readings: of the run, its images read once.
+        true: ``(3,)`` metres, the last contact.
+    """
+    points = []
+    for name, setting in (LEVELS | BY_SENSE if readings.heard else LEVELS).items():
+        prepare(readings.model, setting)
+        solved = loaded(partial(solve, readings, setting))
+        if solved.found is None:
+            continue
+        seconds = (readings.shared[1] + solved.wall) / len(readings.observations)
+        error = float(np.linalg.norm(solved.found.position_in_object - true))
+        points.append(SweepPoint(name, accuracy_at(setting), seconds, error))
+    return tuple(points)
+
+
+_MOST_POSES = 200
+
+
+def _pressed(run: RunFiles, index: int) -> FloatArray:
+    """``(4, 4)`` ``base_from_gel`` of a contact that was chosen on the way, fully pressed, as planned."""
+    motion = ContactMotion.from_parameters(run.recording.step(index).step.parameters)
+    along = translation((motion.search + motion.press) * motion.axis)
+    return np.asarray(along @ motion.base_from_stand_off @ run.station.flange_from_gel)
+
+
+def deviations(run: RunFiles, found: Answer) -> tuple[TwinDeviation, ...]:
+    """By step: the controller's poses against the twin's, and the contact against the rehearsed one."""
+    bench = twin_of(run.scene, run.station, run.mesh)
+    planned = run.recording.header.plan.get("pressed", [])
+    rows = []
+    for index, observation in enumerate(found.observations):
+        readings = run.recording.step(index).readings
+        joints, poses = readings["arm.joints"].values, readings["arm.base_from_flange"].values
+        count = min(len(joints), len(poses))
+        chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_POSES)).astype(np.int64))
+        matrices = np.array([transform(rotation_from_quaternion(p[3:]), p[:3]) for p in poses[chosen]])
+        arm = compare_arm(run.station.arm.model, joints[chosen], matrices)
+        pressed = np.array(planned[index]) if index < len(planned) else _pressed(run, index)
+        rehearsed = predict_contact(bench, index, pressed)
+        contact = compare_contact(bench, rehearsed, observation.base_from_gel).distance
+        rows.append(
+            TwinDeviation(
+                f"step {index + 1}",
+                float(arm.distances.mean()),
+                float(arm.distances.max()),
+                float(arm.angles.max()),
+                contact,
+            )
+        )
+    return tuple(rows)
+
+
+GIVES = ("contact.gel_from_object",)
+"""What an answer gives the simulation."""
+
+
+def sources(scored: Scored) -> Mapping[str, Any]:
+    """The answer's part of what the scene's observed quantities are computed from."""
+    return {"contact.gel_from_object": inverse(object_from_gels(scored.found))}
+
+
+def object_from_gels(found: Answer) -> FloatArray:
+    """``(contacts, 4, 4)``: each gel as deep behind its estimated contact as its own images say."""
+    object_from_base = found.prior.object_from_base(np.array([found.last.yaw]))[0]
+    poses = []
+    for observation, point, height in zip(
+        found.observations, found.last.contacts, found.heights, strict=True
+    ):
+        rotation = object_from_base @ observation.base_from_gel[:3, :3]
+        poses.append(transform(rotation, point + _at_centre(height) * rotation[:, 2]))
+    return read_only(np.array(poses))
+
+
+def _at_centre(height: FloatArray) -> float:
+    rows, columns = height.shape
+    middle = height[(rows - 1) // 2 : rows // 2 + 1, (columns - 1) // 2 : columns // 2 + 1]
+    return float(middle.mean())

@@ -7,10 +7,9 @@ import numpy as np
 
 from experiments.contact_localization.posterior.hypotheses import Hypotheses, anchors
 from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores
+from experiments.contact_localization.posterior.noise import SAME_AXIS, SAME_PLACE
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.sound.evidence import StrikeEvidence
-from experiments.contact_localization.sound.places import ANCHORS, strike_places
-from experiments.contact_localization.touch.contact_scales import SAME_AXIS, SAME_PLACE
+from experiments.contact_localization.sound.evidence import ANCHORS, StrikeEvidence, strike_places
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.bench.acquisition import Strike

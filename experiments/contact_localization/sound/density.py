@@ -10,7 +10,7 @@ weighed as densities: products, and a logarithm only before a product might leav
 
 import numpy as np
 
-from experiments.contact_localization.sound.kernels import put_gains
+from experiments.contact_localization.sound.gains import put_gains
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.compiled import compiled
 

@@ -9,8 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from experiments.contact_localization.touch.attitude import Reading, Sigmas, leanings_at
-from experiments.contact_localization.touch.kernels import fill_scores, similarities_at, terms_at
+from experiments.contact_localization.touch.kernels import (
+    Reading,
+    Sigmas,
+    fill_scores,
+    leanings_at,
+    similarities_at,
+    terms_at,
+)
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
 from harness.bench.bench_errors import USUAL
 from harness.sim.gel.view import ToolView

@@ -20,7 +20,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from experiments.contact_localization.accuracy.cells import cells, scene_of
+from experiments.contact_localization.accuracy.benchmark_runs import cells, scene_of
 from experiments.contact_localization.experiment import EXPERIMENT
 from harness.agreement.agreement import Sense, Verdict
 from harness.agreement.compare_run import agreement_of

@@ -19,8 +19,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from experiments.contact_localization.accuracy.benchmark_runs import Case, perform
-from experiments.contact_localization.accuracy.cells import cells
+from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, perform
 from experiments.contact_localization.accuracy.dials import needs_images
 from experiments.contact_localization.accuracy.solving import Models, prepare, solve
 from experiments.contact_localization.posterior.dials import SENSES

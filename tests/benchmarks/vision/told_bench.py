@@ -17,8 +17,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from experiments.contact_localization.accuracy.benchmark_runs import Case, performed
-from experiments.contact_localization.accuracy.cells import cells
+from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, performed
 from experiments.contact_localization.accuracy.solving import Models
 from experiments.contact_localization.posterior.baselines import without_images
 from experiments.contact_localization.posterior.dials import SPACING, Senses

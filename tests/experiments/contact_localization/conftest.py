@@ -3,7 +3,8 @@
 import pytest
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.hypotheses import Contact, Noise
+from experiments.contact_localization.posterior.hypotheses import Contact
+from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.search import Search
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.optics.tactile_calibration import shipped_calibration

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.cells import Cell
+from experiments.contact_localization.accuracy.benchmark_runs import Cell
 from experiments.contact_localization.answer import Answer, ContactAnswering
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.section import Localization

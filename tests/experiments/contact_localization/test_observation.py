@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from experiments.contact_localization.accuracy.solving import contact_of
+from experiments.contact_localization.accuracy.solving import height_map as checked_height_map
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import contact_of
-from experiments.contact_localization.observation import height_map as checked_height_map
 from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.touch.touch import TouchNoise
 from harness.basics.arrays import ByteArray, FloatArray

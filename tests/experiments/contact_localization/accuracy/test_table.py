@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy import table_cell
-from experiments.contact_localization.accuracy.cells import Cell, cells, scene_of
+from experiments.contact_localization.accuracy import table
+from experiments.contact_localization.accuracy.benchmark_runs import Cell, cells, scene_of
 from experiments.contact_localization.accuracy.solving import read
-from experiments.contact_localization.accuracy.table_cell import METHODS
+from experiments.contact_localization.accuracy.table import METHODS
 from experiments.contact_localization.experiment import EXPERIMENT, MEASUREMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.baselines import mean_random_error
@@ -138,7 +138,7 @@ def test_a_refused_fit_of_the_right_object_is_a_failure_at_the_value_of_a_guess(
     observations = tuple(Observation(pose, blank) for pose in poses)
     true = np.array([0.02, -0.0075, 0.025])
     symmetry = find_symmetries(block.mesh)
-    answered = table_cell._estimated(
+    answered = table._estimated(
         read(observations, block, prior, seed=0), {SPACING.name: 3e-3}, true, symmetry
     )
     assert answered["error_m"] == answered["error_symmetric_m"] == mean_random_error(block.mesh, true)

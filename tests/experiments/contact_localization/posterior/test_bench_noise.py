@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.bench_noise import noise_at
 from experiments.contact_localization.posterior.estimate import locate
-from experiments.contact_localization.posterior.hypotheses import Contact, Noise
+from experiments.contact_localization.posterior.hypotheses import Contact
+from experiments.contact_localization.posterior.noise import Noise, noise_at
 from experiments.contact_localization.posterior.search import Search
 from harness.bench.bench_errors import USUAL
 from tests.support.localization import dials

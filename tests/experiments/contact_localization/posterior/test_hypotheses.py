@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.contact_localization.observation import contact_of
+from experiments.contact_localization.accuracy.solving import contact_of
 from experiments.contact_localization.posterior.hypotheses import (
     UNKNOWN_INDENTATION,
     Contact,

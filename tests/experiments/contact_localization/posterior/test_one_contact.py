@@ -6,7 +6,8 @@ import pytest
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.estimate import locate
 from experiments.contact_localization.posterior.grid import on_samples, refine
-from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, Noise
+from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses
+from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.search import Search
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.geometry import frame_facing, transform

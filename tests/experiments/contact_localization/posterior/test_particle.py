@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.hypotheses import Contact, Noise
+from experiments.contact_localization.posterior.hypotheses import Contact
+from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.particle import CANDIDATES, Particles, particle_filter
 from experiments.contact_localization.posterior.search import Search
 from harness.basics.geometry import translation

@@ -9,16 +9,18 @@ import pytest
 from experiments.contact_localization.accuracy import solving
 from experiments.contact_localization.accuracy.solving import Readings, located
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.estimate import Estimate, locate
-from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, Noise
-from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.posterior.strain import (
+from experiments.contact_localization.posterior.estimate import (
     MOST,
     STRAINED,
     USUAL_FIT,
+    Estimate,
+    locate,
     strain_of,
     times_stated,
 )
+from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses
+from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.search import Search
 from harness.basics.errors import FitRefused
 from harness.bench.bench_errors import USUAL
 from harness.effects.accuracy import Accuracy

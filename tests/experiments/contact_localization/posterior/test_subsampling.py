@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from experiments.contact_localization.model import Prior
+from experiments.contact_localization.posterior.grid import between_samples
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.posterior.subsampling import between_samples
 from harness.basics.arrays import FloatArray
 
 SPACING = 2e-3

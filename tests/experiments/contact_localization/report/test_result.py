@@ -15,7 +15,8 @@ from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.estimate import Estimate, locate
-from experiments.contact_localization.posterior.hypotheses import Contact, Noise
+from experiments.contact_localization.posterior.hypotheses import Contact
+from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.report.result import estimate_of, flags_of
 from harness.basics.errors import RecordingDamaged
 from harness.basics.geometry import translation

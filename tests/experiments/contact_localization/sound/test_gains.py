@@ -5,8 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.contact_localization.sound.gains import GainTable, find_rotation_pairs, gain_table
-from experiments.contact_localization.sound.kernels import faces_about
+from experiments.contact_localization.sound.gains import (
+    GainTable,
+    faces_about,
+    find_rotation_pairs,
+    gain_table,
+)
 from experiments.contact_localization.sound.likelihood import SoundTerm
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.geometry import rotation_about

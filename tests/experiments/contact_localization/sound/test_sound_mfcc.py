@@ -8,10 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.hypotheses import Contact, Noise
-from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.sound.gains import gain_table
-from experiments.contact_localization.sound.mfcc import (
+from experiments.contact_localization.posterior.baselines import (
     Mfcc,
     MfccTable,
     cepstra,
@@ -19,6 +16,10 @@ from experiments.contact_localization.sound.mfcc import (
     mfcc,
     mfcc_filter,
 )
+from experiments.contact_localization.posterior.hypotheses import Contact
+from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.search import Search
+from experiments.contact_localization.sound.gains import gain_table
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import frame_facing, transform

@@ -7,15 +7,21 @@ import pytest
 from scipy.signal import find_peaks
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, Noise, anchors
+from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, anchors
+from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.posterior import best_point
 from experiments.contact_localization.posterior.search import MOST_HYPOTHESES, Search
-from experiments.contact_localization.report.sound_pictures import sound_pair, spectrogram
-from experiments.contact_localization.sound.evidence import StrikeEvidence, hear
+from experiments.contact_localization.report.sound_report import sound_pair, spectrogram
+from experiments.contact_localization.sound.evidence import (
+    ANCHORS,
+    StrikeEvidence,
+    by_sound,
+    hear,
+    sound_nats,
+    strike_places,
+)
 from experiments.contact_localization.sound.gains import gain_table
-from experiments.contact_localization.sound.likelihood import SoundTerm
-from experiments.contact_localization.sound.matching import SoundNoise
-from experiments.contact_localization.sound.places import ANCHORS, by_sound, sound_nats, strike_places
+from experiments.contact_localization.sound.likelihood import SoundNoise, SoundTerm
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, rotation_about, transform
 from harness.basics.materials import Material

@@ -9,8 +9,12 @@ from hypothesis import strategies as st
 
 from experiments.contact_localization.sound.density import MOST_RANK, add_densities, sound_scores
 from experiments.contact_localization.sound.gains import gain_table
-from experiments.contact_localization.sound.likelihood import SoundTerm
-from experiments.contact_localization.sound.matching import SoundNoise, group_starts, likely_scales
+from experiments.contact_localization.sound.likelihood import (
+    SoundNoise,
+    SoundTerm,
+    group_starts,
+    likely_scales,
+)
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.materials import MATERIALS

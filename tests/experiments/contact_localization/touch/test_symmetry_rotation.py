@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.contact_localization.touch.symmetry_rotation import Turning, turning_of
+from experiments.contact_localization.model import Turning, turning_of
 from harness.basics.geometry import rotation_about
 from harness.objects.household import build
 from harness.sim.gel.height_map import RasterMesh, depth_image

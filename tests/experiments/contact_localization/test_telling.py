@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from experiments.contact_localization.choosing.telling import (
+from experiments.contact_localization.model import Prior
+from experiments.contact_localization.next_contact import (
     HYPOTHESES,
     MOST,
     BelievedGels,
@@ -11,7 +12,6 @@ from experiments.contact_localization.choosing.telling import (
     errors_left,
     readings_at,
 )
-from experiments.contact_localization.model import Prior
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.cells import Cell
-from experiments.contact_localization.choosing import next_contact, telling
-from experiments.contact_localization.choosing.next_contact import EXPECTED, PLACEHOLDER, ChosenContacts
+from experiments.contact_localization import next_contact
+from experiments.contact_localization.accuracy.benchmark_runs import Cell
 from experiments.contact_localization.experiment import EXPERIMENT, PLAN_KEY
+from experiments.contact_localization.next_contact import EXPECTED, PLACEHOLDER, ChosenContacts
 from experiments.contact_localization.section import Localization
 from harness.basics.errors import MotionRefused, WrongUse
 from harness.bench.scene import SceneFile, Sensors, scene_from_options
@@ -92,7 +92,7 @@ def test_the_place_that_should_leave_least_error_is_taken(
     run: RunFiles, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     left = []
-    inner = telling.errors_left
+    inner = next_contact.errors_left
 
     def noted(*given: object) -> object:
         left.append(inner(*given))  # type: ignore[arg-type]

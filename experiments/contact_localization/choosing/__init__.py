@@ -1,1 +1,0 @@
-"""Which place is touched next, by what the contacts so far say."""

@@ -1,0 +1,210 @@
+"""Noise of every term: what all contacts share, what each has to itself, and how much its image counts.
+
+An object that stands a little crooked, or is a little larger than its model, and a gel that is not quite
+where the tool's description puts it, move every contact at once. These shared errors are unknowns next to
+place and yaw, so that only the arm's own error is left to each contact. The terms were fitted to runs on a
+bench with the usual errors; on another bench each is wider or narrower in proportion to the errors that
+cause it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from experiments.contact_localization.posterior.likelihood import GeometryNoise
+from experiments.contact_localization.touch.touch import TouchNoise
+from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.bench.bench_errors import USUAL, BenchErrors
+
+UNKNOWNS = 6
+"""Tilt about base x and y, scale, and the gel's centre in its own frame, each in units of its sigma."""
+
+
+@dataclass(frozen=True)
+class SharedNoise:
+    """One sigma of what contacts share, and of what is left to each.
+
+    Attributes:
+        tilt: rad, of the object about base x and about base y.
+        scale: of the object's true size over its model's, less 1.
+        gel_centre: metres, of the gel's centre along each axis of its own frame.
+        shift: metres, left to each contact in the plane of the gel: the arm, and the shape there.
+        depth: metres, the same across it.
+        per_metre: metres of sigma left for each metre between contacts: what a shape's
+            error is not, a scale.
+    """
+
+    tilt: float = USUAL.tilt
+    scale: float = USUAL.scale
+    gel_centre: float = USUAL.gel_centre
+    shift: float = USUAL.arm
+    depth: float = USUAL.arm
+    per_metre: float = 2.0e-3
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of every term, as measured on calibration runs.
+
+    Attributes:
+        geometry: of places and tool axes.
+        unread: the same where no image is read: how far the gel was pressed in, and past which edge, is not
+            known there, so that the surface met may face elsewhere than the one that was aimed at.
+        touch: of the images.
+        temperature: factor on the images' share: their errors are shared between contacts.
+        shared: of what all contacts share, and of what is left to each where that is named.
+        floor: factor on what regions are widened by beside the hypotheses' own spread (``estimate.FLOORS``).
+    """
+
+    geometry: GeometryNoise = field(default_factory=GeometryNoise)
+    unread: GeometryNoise = field(default_factory=lambda: GeometryNoise(gap=1.2e-3, angle=np.radians(4.0)))
+    touch: TouchNoise = field(default_factory=TouchNoise)
+    temperature: float = 0.8
+    shared: SharedNoise = field(default_factory=SharedNoise)
+    floor: float = 1.0
+
+
+def moves(noise: SharedNoise, places: FloatArray, attitudes: FloatArray, members: BoolArray) -> FloatArray:
+    """``(contacts, 6, 3)`` metres in base by which a sigma of each shared error moves each contact's gel.
+
+    Against their mean over the contacts that count: moving all alike is a hypothesis's own place, and what
+    errors do beside that says little of it, so that the two are drawn apart from each other. To first order,
+    of which the next is a micrometre or so at half a degree and 100 mm.
+
+    Args:
+        noise: the sigmas.
+        places: ``(contacts, 3)`` metres in base, of the gel's centre.
+        attitudes: ``(contacts, 3, 3)``: of the gel in base.
+        members: ``(contacts,)`` whether each counts; at least one.
+    """
+    tilted = noise.tilt * np.cross(np.eye(3)[None, :2], places[:, None])
+    turned = noise.gel_centre * np.swapaxes(attitudes, 1, 2)
+    each = np.concatenate([tilted, noise.scale * places[:, None], turned], axis=1)
+    return np.asarray(each - each[members].mean(axis=0))
+
+
+def log_prior(shared: FloatArray | None) -> FloatArray | float:
+    """``(n,)`` nats, up to a constant; 0 where nothing is named."""
+    return 0.0 if shared is None else np.asarray(-0.5 * np.sum(shared**2, axis=1))
+
+
+def noise_at(errors: BenchErrors) -> Noise:
+    """The noise of the terms, and of what all contacts share.
+
+    Args:
+        errors: of the bench, as its station states them.
+    """
+    noise, place, turn = Noise(), _ratio(errors, "arm", "gel_centre"), _turn(errors)
+    return replace(
+        noise,
+        geometry=_geometry(noise.geometry, errors, place, turn),
+        unread=_geometry(noise.unread, errors, place, turn),
+        touch=_touch(noise.touch, errors, place, turn),
+        shared=_shared(noise.shared, errors),
+        floor=noise.floor * _ratio(errors, "arm"),
+    )
+
+
+def _ratio(errors: BenchErrors, *names: str) -> float:
+    """Of errors that add in squares, over the usual ones."""
+    ours, usual = (np.linalg.norm([getattr(some, name) for name in names]) for some in (errors, USUAL))
+    return float(ours / usual)
+
+
+def _turn(errors: BenchErrors) -> float:
+    """Of all that turns the gel against the object's surface."""
+    return _ratio(errors, "yaw", "tilt", "gel_tilt", "arm_tilt")
+
+
+def _geometry(noise: GeometryNoise, errors: BenchErrors, place: float, turn: float) -> GeometryNoise:
+    reach = _ratio(errors, "scale", "tilt")
+    return replace(
+        noise,
+        gap=noise.gap * place,
+        gap_per_metre=noise.gap_per_metre * reach,
+        angle=noise.angle * turn,
+    )
+
+
+def _touch(noise: TouchNoise, errors: BenchErrors, place: float, turn: float) -> TouchNoise:
+    return replace(
+        noise,
+        rms=noise.rms * _ratio(errors, "gel_depth"),
+        tilt=noise.tilt * turn,
+        spin=noise.spin * _ratio(errors, "gel_yaw"),
+        shift=noise.shift * place,
+        depth=noise.depth * place,
+    )
+
+
+def _shared(noise: SharedNoise, errors: BenchErrors) -> SharedNoise:
+    own = _ratio(errors, "arm")
+    return replace(
+        noise,
+        tilt=errors.tilt,
+        scale=errors.scale,
+        gel_centre=errors.gel_centre,
+        shift=noise.shift * own,
+        depth=noise.depth * own,
+        per_metre=noise.per_metre * own,
+    )
+
+
+SAME_PLACE = 1.5e-3
+"""Metres between two presses that count as one place."""
+
+SAME_AXIS = np.radians(4.0)
+"""rad between their tools."""
+
+_CAP_ALONE = 1000.0
+"""Nats: beyond what any place that fits costs, and a number where none does."""
+
+
+def contact_scales(
+    positions: FloatArray,
+    axes: FloatArray,
+    members: IntArray,
+    noise: Noise,
+    per_metre: float,
+    named: bool,
+) -> Iterator[tuple[int, float, float]]:
+    """Contact, sigma of its place in metres, and temperature of its image.
+
+    Args:
+        positions: ``(contacts, 3)`` metres in base.
+        axes: ``(contacts, 3)`` unit in base: where the tool points.
+        members: ``(m,)`` indices of the contacts that count.
+        noise: of the terms.
+        per_metre: metres of sigma for each metre from the contacts' middle, where errors that they share are
+            not named.
+        named: whether they are; what is left to each contact is less.
+    """
+    own = place_noise(noise, named)
+    reach = np.linalg.norm(positions[members] - positions[members].mean(axis=0), axis=1)
+    sigmas = np.hypot(own.shift, (noise.shared.per_metre if named else per_metre) * reach)
+    temperatures = noise.temperature / _alike(positions[members], axes[members]).sum(axis=1)
+    for k, sigma, temperature in zip(members, sigmas, temperatures, strict=True):
+        yield int(k), float(sigma), float(temperature)
+
+
+def place_noise(noise: Noise, named: bool) -> TouchNoise:
+    """Of the images; of the places what is each contact's own, where the shared errors are named."""
+    if not named:
+        return noise.touch
+    return replace(noise.touch, shift=noise.shared.shift, depth=noise.shared.depth)
+
+
+def cap_of(noise: TouchNoise, contacts: int) -> float:
+    """Nats that each of so many contacts may cost: one alone is no outlier.
+
+    An outlier fits every place alike, and where other contacts fit they say where it was. Of a contact alone
+    it would make all places alike, of which there are many more than such as fit.
+    """
+    return noise.cap if contacts > 1 else _CAP_ALONE
+
+
+def _alike(positions: FloatArray, axes: FloatArray) -> FloatArray:
+    """``(m, m)``: presses repeated at one place share their errors: their images together count as one."""
+    gaps = np.linalg.norm(positions[:, None] - positions[None], axis=2)
+    return np.asarray((gaps < SAME_PLACE) & (axes @ axes.T > np.cos(SAME_AXIS)), dtype=np.float64)
