@@ -9,7 +9,7 @@ from experiments.contact_localization.accuracy.solving import (
     loaded,
     located,
     prepare,
-    timed_height_map,
+    read,
 )
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
@@ -106,12 +106,12 @@ class ContactAnswering:
         station = self._run.station
         aspect = aspect_stated(self._run.calibration.header.made_from)
         seen = observe_step(record, station.flange_from_gel, self._run.acquisition, aspect)
-        heights, refusal, cpu, wall = loaded(lambda: timed_height_map(seen, self.model))
-        if refusal:
-            self._refused_pictures[len(self._seen)] = refusal
+        one = loaded(lambda: read([seen], self.model, self.prior, seed=0))
+        if one.refused_pictures:
+            self._refused_pictures[len(self._seen)] = one.refused_pictures[0]
         self._seen.append(seen)
-        self._heights.append(heights)
-        self._taken = (self._taken[0] + cpu, self._taken[1] + wall)
+        self._heights += one.heights
+        self._taken = (self._taken[0] + one.shared[0], self._taken[1] + one.shared[1])
 
     def answer(self) -> Answer:
         """By the sense that the accuracy names, and by each other one that was recorded.
@@ -127,7 +127,7 @@ class ContactAnswering:
         readings = self.readings
         senses: tuple[Senses, ...] = SENSES.levels if readings.struck else ("touch",)
         sense = self._sense_of(readings)
-        last = loaded(lambda: self._by(sense, readings))
+        last = loaded(lambda: self._located(sense, readings)[-1])
         others = {other: self._tried(other, readings) for other in senses if other != sense}
         seconds = sum(last.seconds.values())
         seen, heights = readings.observations, readings.heights
@@ -142,7 +142,7 @@ class ContactAnswering:
             FitRefused: no place on this object explains the readings, or no picture of them may be used.
         """
         readings = self.readings
-        return self._located(self._sense_of(readings), readings, None, judged=False)[-1]
+        return self._located(self._sense_of(readings), readings, judged=False)[-1]
 
     def _sense_of(self, readings: Readings) -> Senses:
         """What the answer is by."""
@@ -166,16 +166,13 @@ class ContactAnswering:
         try:
             return (*self._located(sense, readings.first(count - 1), 1, judged=False), last)
         except (FitRefused, WrongUse):  # the first images show no contact, or were not struck
-            return (*(self._early(sense, readings.first(k)) for k in range(1, count)), last)
-
-    def _early(self, sense: Senses, readings: Readings) -> Estimate | FitRefused:
-        try:
-            return self._located(sense, readings, None, judged=False)[-1]
-        except (FitRefused, WrongUse) as refusal:
-            return FitRefused(str(refusal))
-
-    def _by(self, sense: Senses, readings: Readings) -> Estimate:
-        return self._located(sense, readings, None)[-1]
+            early: list[Estimate | FitRefused] = []
+            for k in range(1, count):
+                try:
+                    early += self._located(sense, readings.first(k), judged=False)
+                except (FitRefused, WrongUse) as refusal:
+                    early.append(FitRefused(str(refusal)))
+            return (*early, last)
 
     @property
     def _sound_refusal(self) -> str:
@@ -186,12 +183,12 @@ class ContactAnswering:
         if self.model.sound_refusal and sense != "touch":
             return FitRefused(self._sound_refusal)
         try:
-            return loaded(lambda: self._by(sense, readings))
+            return loaded(lambda: self._located(sense, readings)[-1])
         except FitRefused as refusal:
             return refusal
 
     def _located(
-        self, sense: Senses, readings: Readings, first: int | None, judged: bool = True
+        self, sense: Senses, readings: Readings, first: int | None = None, judged: bool = True
     ) -> tuple[Estimate, ...]:
         return located(readings, self._accuracy.with_({SENSES.name: sense}), first, judged)
 

@@ -21,7 +21,6 @@ from harness.effects.scene_object import known_file
 from harness.effects.touch_file_effects import SHAPES
 from harness.experiment.object_modes import ReadFile, carried_by, object_modes
 from harness.recording.run_folder import RunFiles
-from harness.sim.modal.modes import Modes
 from harness.sim.optics.tactile_calibration import TactileCalibration
 from harness.sim.solid.walls import walled
 
@@ -72,18 +71,14 @@ def model_of_scene(
     if not scene.sensors.sound:
         return Model(mesh, sensor, calibration, seen=seen, seen_rms=rms, errors=station.errors)
     modes = object_modes(scene, station, mesh, chosen, objectfile)
-    _refuse_loose(modes)
-    material = MATERIALS[scene.object.material]
-    return Model(mesh, sensor, calibration, modes, material, seen=seen, seen_rms=rms, errors=station.errors)
-
-
-def _refuse_loose(modes: Modes) -> None:
     loose = int(np.count_nonzero(~(modes.frequencies > 0.0)))
     if loose:
         raise MeshRefused(
             f"{loose} of the object's {len(modes.frequencies)} modes have no stiffness: parts of it hang "
             "together by an edge or a point only; join them by faces"
         )
+    material = MATERIALS[scene.object.material]
+    return Model(mesh, sensor, calibration, modes, material, seen=seen, seen_rms=rms, errors=station.errors)
 
 
 if TYPE_CHECKING:

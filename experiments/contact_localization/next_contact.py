@@ -37,14 +37,17 @@ from harness.twin.strike_motion import StrikePlanner
 CANDIDATES = 24
 """Places drawn for each contact; of those with a free way the one that leaves least error is taken."""
 
+
 FARTHER = 0.3
 """Share of the expected error by which the farthest place from all contacts so far seems better: one contact
 is looked ahead, and on a flat side no place near by tells much, while a walk that goes on comes to an edge.
 Errors after three and five contacts of 32 development runs, beyond 20 mm alike: 2.7 and 1.5 mm with, 3.4 and
 2.1 without (errors then capped), 4.1 and 2.2 by planned contacts."""
 
+
 EXPECTED = "expected_error_m"
 """Of a step's parameters: the error that was expected to be left after it; not there where nothing told."""
+
 
 PLACEHOLDER: Mapping[str, Any] = {"choose": "active"}
 """What ``run.json`` keeps of a contact that is planned once those before it are read."""
@@ -124,7 +127,10 @@ class ChosenContacts:
         touched = np.array([self._touched(parameters) for parameters in self._before])
         sites = self._candidates(touched, (recording.header.seed, index))
         left = self._errors_left(sites, estimate)
-        for k in np.argsort(left * (1.0 - FARTHER * _far(sites, touched)), kind="stable"):
+        # How far each is from all contacts so far, beside the farthest.
+        points = np.array([site.point_in_object for site in sites])
+        gaps = np.linalg.norm(points[:, None] - touched, axis=2).min(axis=1)
+        for k in np.argsort(left * (1.0 - FARTHER * (gaps / gaps.max())), kind="stable"):
             planned = self._planned(sites[k], index)
             if planned is None:
                 continue
@@ -178,32 +184,31 @@ class ChosenContacts:
             return None
 
 
-def _far(sites: Sequence[Site], touched: FloatArray) -> FloatArray:
-    """``(n,)`` from 0 to 1: how far each is from all contacts so far, beside the farthest."""
-    points = np.array([site.point_in_object for site in sites])
-    gaps = np.linalg.norm(points[:, None] - touched, axis=2).min(axis=1)
-    return np.asarray(gaps / gaps.max())
-
-
 GEL = read_only(
     1.0e-3 * np.array([[0, 0], [6, 0], [-6, 0], [0, 5], [0, -5], [5, 4], [-5, 4], [5, -4], [-5, -4]], float)
 )
 """``(9, 2)`` m along x and y of the gel: places of its face; the first that meets something stops it."""
 
+
 BEFORE = 40.0e-3
 """M before a place from where on the gel's way to it is followed."""
+
 
 BEYOND = 30.0e-3
 """M behind a place up to which it is followed; what is met later is not met."""
 
+
 STOPPED, STOPPED_PER_METRE = 1.0e-3, 8.0e-3
 """M by which the place where the gel is stopped is off, and of that for each m from the first contact."""
+
 
 SHAPED, DEEPEST = 0.57e-3, 2.5e-3
 """M by which heights under the gel are off, with how much they go together, and how deep a gel sees."""
 
+
 MOST = 9.0
 """Half squares that two readings differ by at most."""
+
 
 HYPOTHESES = 80
 """That stand for the posterior, at most."""
@@ -249,13 +254,12 @@ def errors_left(rays: RayMesh, at: BelievedGels, places: Sequence[FloatArray]) -
         at: what is believed.
         places: ``(4, 4)`` ``base_from_gel`` each, were the object where it should be.
     """
-    return np.array([_error_left(rays, at, place) for place in places])
-
-
-def _error_left(rays: RayMesh, at: BelievedGels, base_from_gel: FloatArray) -> float:
-    read, points = readings_at(rays, at, base_from_gel)
-    apart = np.linalg.norm(points[:, None] - points, axis=2)
-    return bayes_risk_after(read, at.weights, apart, MOST)
+    errors = []
+    for place in places:
+        read, points = readings_at(rays, at, place)
+        apart = np.linalg.norm(points[:, None] - points, axis=2)
+        errors.append(bayes_risk_after(read, at.weights, apart, MOST))
+    return np.array(errors)
 
 
 def readings_at(rays: RayMesh, at: BelievedGels, base_from_gel: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -12,9 +12,7 @@ from experiments.contact_localization.accuracy.dials import (
     FINEST,
     SIMULATED,
     needs_images,
-    needs_objectfile,
     needs_sound,
-    saves_no_answer_time,
 )
 from experiments.contact_localization.accuracy.solving import Models, Readings, prepare, read, solve
 from experiments.contact_localization.answer import observe, prior_of
@@ -30,6 +28,7 @@ from harness.bench.scene import SceneFile
 from harness.cost.curve import Curve
 from harness.cost.file import load
 from harness.effects.accuracy import Level, Setting
+from harness.effects.sound_effects import EDGE, SHAPES
 from harness.effects.touch_file_effects import SHAPES as TOUCH
 from harness.experiment.solving import Budgets, Solved
 from harness.experiment.subjects import object_key
@@ -144,22 +143,21 @@ def _condition(scene: SceneFile) -> Mapping[str, Level]:
 def _unfit(scene: SceneFile, setting: Setting) -> str | None:
     if needs_sound(setting) and not scene.sensors.sound:
         return _UNHEARD
-    return _NO_OBJECTFILE if needs_objectfile(setting) and scene.object.objectfile is None else None
+    networks = any(setting.get(dial.name, dial.default) != dial.default for dial in (SHAPES, TOUCH))
+    return _NO_OBJECTFILE if networks and scene.object.objectfile is None else None
 
 
-def _offered(setting: Setting) -> bool:
-    """Coarser elements are measured for what they cost in accuracy; they are quicker once an object.
-
-    Of settings that err alike one of them would be chosen by luck.
-    """
-    return not saves_no_answer_time(setting)
-
-
-def _contacts(scene: SceneFile) -> int:
-    return scene.section(Localization).contacts
-
-
-BUDGETS = Budgets(run_of, FINEST, _contacts, _condition, _unfit, _offered, shipped_curve)
+BUDGETS = Budgets(
+    solver=run_of,
+    finest=FINEST,
+    steps=lambda scene: scene.section(Localization).contacts,
+    condition=_condition,
+    unfit=_unfit,
+    # Coarser elements are measured for what they cost in accuracy; they are quicker once an object. Of
+    # settings that err alike one of them would be chosen by luck.
+    offered=lambda setting: setting.get(EDGE.name, EDGE.default) == EDGE.default,
+    shipped=shipped_curve,
+)
 
 
 COARSE_SPACING = 8.0e-3

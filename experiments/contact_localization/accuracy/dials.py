@@ -22,8 +22,10 @@ from harness.objectfile.entries import Modality
 
 KNOBS = (*DIALS, *knobs_of(EFFECTS))
 
+
 HEARD: tuple[Knob[Level], ...] = (MODES, EDGE, SHAPES)
 """Dials of the modes that an estimate compares sounds with."""
+
 
 SIMULATED: tuple[Knob[Level], ...] = (*HEARD, TOUCH)
 """Dials of the simulation that an estimate depends on: its modes, and what candidates' tactile images are
@@ -50,8 +52,13 @@ def by_sound(spacing: float) -> dict[str, Level]:
 _DIALS: Mapping[Modality, Knob[Level]] = {"touch": TOUCH, "audio": SHAPES}
 """By the sense whose network is a level of them."""
 
+
 _COARSEST = (4e-3, 0, 3000, 16)
+
+
 _DEFAULT = (2e-3, 5, 3000, 8)
+
+
 _GRIDS = (
     _COARSEST,
     (3e-3, 0, 3000, 16),
@@ -64,6 +71,7 @@ _GRIDS = (
     (1.5e-3, 5, 6000, 8),
 )
 """Spacing, rounds, samples and block: from the cheapest to the finest, where the front is likely to lie."""
+
 
 FINEST = grid("both", 1.5e-3, 5, 6000, 8)
 """What is asked after an answer, to say what more time would have given."""
@@ -159,13 +167,3 @@ def needs_images(setting: Mapping[str, Level]) -> bool:
 def needs_sound(setting: Mapping[str, Level]) -> bool:
     """Whether a setting was measured on runs that were heard; one that names no sense was not."""
     return setting.get(SENSES.name, "touch") != "touch"
-
-
-def needs_objectfile(setting: Mapping[str, Level]) -> bool:
-    """Whether a setting takes modes or touch from an ObjectFile."""
-    return any(setting.get(dial.name, dial.default) != dial.default for dial in (SHAPES, TOUCH))
-
-
-def saves_no_answer_time(setting: Mapping[str, Level]) -> bool:
-    """Whether a setting's modes are of coarser elements: found sooner, once an object; heard no faster."""
-    return setting.get(EDGE.name, EDGE.default) != EDGE.default

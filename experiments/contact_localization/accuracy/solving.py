@@ -10,9 +10,9 @@ from numba.core.event import install_recorder
 from experiments.contact_localization.accuracy.dials import SIMULATED, accuracy_at, needs_images, needs_sound
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import BLOCK, METHOD, ROUNDS, SAMPLES, SPACING
-from experiments.contact_localization.posterior.estimate import Estimate, locate, times_stated
+from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact
-from experiments.contact_localization.posterior.noise import Noise, noise_at
+from experiments.contact_localization.posterior.noise import noise_at
 from experiments.contact_localization.touch.touch import TouchNoise, touch_map
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
@@ -25,9 +25,13 @@ from harness.sim.optics.inverse import heights_or_refusal
 
 T = TypeVar("T")
 
+
 PROGRAM = "contact-localization"
+
+
 ESTIMATOR = "experiments.contact_localization.posterior.estimate"
 """The module whose sources, with all they import, decide whether a curve still holds."""
+
 
 _LOOKED_BY = (SPACING, ROUNDS, SAMPLES, BLOCK)
 """How finely readings are looked at; which senses are asked, and how they are simulated, is another thing."""
@@ -127,18 +131,11 @@ def read(
         images: whether any setting looks at the images.
     """
     cpu, wall = time.process_time(), time.perf_counter()
-    maps = [height_map(observation, model) for observation in observations] if images else []
+    maps = [heights_or_refusal(each.images, model.calibration) for each in observations] if images else []
     taken = time.process_time() - cpu, time.perf_counter() - wall
     heights = tuple(heights for heights, _ in maps)
     refused_pictures = {contact: refusal for contact, (_, refusal) in enumerate(maps) if refusal}
     return Readings(tuple(observations), heights, model, prior, seed, taken, refused_pictures)
-
-
-def timed_height_map(observation: Observation, model: Model) -> tuple[FloatArray, str, float, float]:
-    """A contact's height map, why its picture is refused, and the s of CPU time and on the clock it took."""
-    cpu, wall = time.process_time(), time.perf_counter()
-    heights, refusal = height_map(observation, model)
-    return heights, refusal, time.process_time() - cpu, time.perf_counter() - wall
 
 
 def loaded(timed: Callable[[], T]) -> T:
@@ -197,7 +194,7 @@ def located(
             raise
         lost = time.perf_counter() - began
         return _looked_again(located(readings, usual, first, judged), lost)
-    factor = times_stated(found[-1].strain) if judged and accuracy.of(METHOD) == "grid" else 1.0
+    factor = found[-1].times_stated if judged and accuracy.of(METHOD) == "grid" else 1.0
     if factor == 1.0:
         return found
     less_sure = replace(readings, prior=readings.prior.times(factor))
@@ -223,7 +220,12 @@ def _located_at(
     noise, images = noise_at(errors), needs_images(accuracy)
     if images and not readings.pictured:
         raise FitRefused(f"no contact's picture may be used; of contact 1: {readings.refused_pictures[0]}")
-    contacts = _contacts(readings, accuracy.of(BLOCK), noise, images)
+    pitch, block = readings.model.sensor.pitch, accuracy.of(BLOCK)
+    contacts = [Contact(observation.base_from_gel) for observation in readings.observations]
+    for index, heights in enumerate(readings.heights if images else ()):
+        if index not in readings.refused_pictures:
+            pose = contacts[index].base_from_gel
+            contacts[index] = contact_of(pose, heights, pitch, block, noise.touch)
     strikes = [observation.strike for observation in readings.observations] if readings.heard else []
     seconds = readings.shared[1] if images else 0.0
     model, prior, seed = readings.model, readings.prior, readings.seed
@@ -241,19 +243,6 @@ def _widened(stated: Estimate, wider: Estimate, factor: float) -> Estimate:
     return replace(wider, seconds=seconds, doubts=(*wider.doubts, doubt))
 
 
-def _contacts(readings: Readings, block: int, noise: Noise, images: bool) -> list[Contact]:
-    if not images:
-        return [Contact(observation.base_from_gel) for observation in readings.observations]
-    pitch = readings.model.sensor.pitch
-    pairs = zip(readings.observations, readings.heights, strict=True)
-    return [
-        Contact(observation.base_from_gel)
-        if index in readings.refused_pictures
-        else contact_of(observation.base_from_gel, heights, pitch, block, noise.touch)
-        for index, (observation, heights) in enumerate(pairs)
-    ]
-
-
 CONTACT_THRESHOLD = 0.12e-3
 """Metres of indentation, averaged over a compared pixel, below which no contact is seen."""
 
@@ -266,11 +255,3 @@ def contact_of(
     # A contact of one fine pixel is still seen in the four times larger one that holds it.
     coarse = touch_map(heights, pitch, 2 * block, noise.skirt, noise.edge, 0.25 * CONTACT_THRESHOLD)
     return Contact(base_from_gel, fine, coarse)
-
-
-def height_map(observation: Observation, model: Model) -> tuple[FloatArray, str]:
-    """``(rows, columns)`` metres of indentation, from the mean of the contact's frames, and no text.
-
-    Zeros, and why, where the picture is not what the calibration was made of.
-    """
-    return heights_or_refusal(observation.images, model.calibration)

@@ -1,14 +1,27 @@
-"""One cell of the localization table: a mocked run in process, answered by every method."""
+"""Measuring localization: which runs, a table's rows by every method, and the settings that are timed."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.benchmark_runs import Cell, perform
-from experiments.contact_localization.accuracy.dials import accuracy_at, needs_images
-from experiments.contact_localization.accuracy.solving import Readings, solve
+from experiments.contact_localization.accuracy.benchmark_runs import (
+    Cell,
+    cells,
+    perform,
+    performed,
+    preparations,
+)
+from experiments.contact_localization.accuracy.dials import (
+    accuracy_at,
+    needs_images,
+    setting_name,
+    settings,
+    settings_by_count,
+)
+from experiments.contact_localization.accuracy.solving import ESTIMATOR, Readings, solve
 from experiments.contact_localization.posterior.baselines import (
     MfccTable,
     mean_random_error,
@@ -27,6 +40,9 @@ from harness.basics.symmetry import SymmetryGroup, find_symmetries
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Setting
+from harness.effects.file_levels import networks_of
+from harness.effects.scene_object import named_file
+from harness.experiment.experiment import MeasuredCondition, Measurement
 
 METHODS = ("random", "geometry", "geometry + axis", "paper's touch filter", "touch")
 HEARD = ("paper's MFCC filter", "audio", "both")
@@ -74,6 +90,24 @@ def _scored(method: str, readings: Readings, true: FloatArray, symmetry: Symmetr
     return _estimated(readings, _SETTINGS[method], true, symmetry)
 
 
+def _cells(objects: Sequence[str], seeds: Sequence[int], chosen: Mapping[str, Sequence[str]]) -> list[Cell]:
+    heard = _heard(chosen)
+    return cells(objects, seeds, chosen["spacing"], chosen["gap"], chosen["yaw"], heard, chosen["choose"])
+
+
+def _heard(chosen: Mapping[str, Sequence[str]]) -> bool:
+    return "both" in chosen["sense"]
+
+
+def _settings(
+    thorough: bool, chosen: Mapping[str, Sequence[str]], scenes: Mapping[str, SceneFile]
+) -> Sequence[Setting]:
+    named = [scene for scene in scenes.values() if scene.object.objectfile is not None]
+    networks = [networks_of(named_file(scene).description) for scene in named]
+    shared = frozenset.intersection(*networks) if len(named) == len(scenes) else frozenset()
+    return settings(thorough, _heard(chosen), shared)
+
+
 def _by_mfcc(readings: Readings) -> FloatArray:
     """``(3,)`` metres: the mean of the paper's filter's most probable distinct particles."""
     model, strikes = readings.model, [observation.strike for observation in readings.observations]
@@ -102,12 +136,9 @@ def _estimated(
             "refused": solved.refusal,
             "in_region90": False,
         }
-    scored = _errors(solved.found.position_in_object, true, symmetry, seconds)
-    return {**scored, **_sureness(solved.found, true)}
-
-
-def _sureness(found: Estimate, true: FloatArray) -> dict[str, Any]:
+    found: Estimate = solved.found
     return {
+        **_errors(found.position_in_object, true, symmetry, seconds),
         "in_region90": found.region.contains(true),
         "region90_area_m2": found.region.area,
         "credible90_m": found.credible90,
@@ -136,3 +167,24 @@ PAPER_CM = {
 }
 """ObjectFolder 2.0, table 4: mean error in cm over six objects of theirs, 5 to 7 contacts; the last two
 objects were not struck in reality."""
+
+MEASUREMENT = Measurement(
+    estimator=ESTIMATOR,
+    conditions=(
+        MeasuredCondition("spacing", ("close", "spread"), ("close", "spread")),
+        MeasuredCondition("yaw", ("known", "unknown"), ("known",), ("known", "unknown")),
+        MeasuredCondition("choose", ("planned", "active"), ("planned",), ("planned",)),
+        MeasuredCondition("sense", ("touch", "both"), ("both",)),
+    ),
+    cells=_cells,
+    run_cell=run_cell,
+    methods=(*METHODS, *HEARD),
+    performed=performed,
+    settings=_settings,
+    setting_name=setting_name,
+    fewer=lambda chosen: settings_by_count(_heard(chosen)),
+    counts=(2, 4, 6),
+    regions=("touch", "audio", "both"),
+    notes=preparations,
+    published=PAPER_CM,
+)

@@ -13,19 +13,26 @@ from harness.basics.errors import FitRefused
 REFUSE_BELOW = -9.0
 """Nats: the median of the contacts' fits at the best hypothesis. Calibration runs: -3.0 to -0.5."""
 
+
 REFUSE_QUARTILE_BELOW = -14.0
 """Nats: the lower quartile, of four contacts or more. Calibration runs: -4.3 to -0.8."""
+
 
 REFUSE_FEW_BELOW = -20.0
 """Nats: the median of fewer than four contacts, of which a single odd one may be half."""
 
+
 SLIPPED_BELOW = -10.0
 """Nats of one contact where the others fit."""
+
 
 _WALL = 6.0e-3
 """M: a wall no thicker is thin beside what the place is known to."""
 
+
 _ENOUGH = 4
+
+
 _FAR_BELOW = -1000.0
 
 
@@ -134,10 +141,19 @@ def refuse_inside_out(search: Search, one: Hypotheses, members: IntArray) -> Non
     Raises:
         FitRefused: naming the contact that faces away most.
     """
-    facing = np.array([_facing(search, int(k), one) for k in members])
-    # Beside a thin wall the nearest sample may be of its other face: half of the contacts are no majority,
-    # and a contact alone is believed where a wall's other face is near.
-    if np.mean(facing > 0.0) > 0.5 and not (len(members) == 1 and _walled(search, int(members[0]), one)):
+    surface, object_from_base = search.surface, search.prior.object_from_base(one.yaws)[0]
+    points = [search.surface_points(int(k), one)[0] for k in members]
+    axes = [object_from_base @ search.contacts[int(k)].axis for k in members]
+    # Cosines between the tool's axis and the outward normal; -1 for a square press.
+    normals = [surface.normals[surface.tree.query(point)[1]] for point in points]
+    facing = np.array([float(normal @ axis) for normal, axis in zip(normals, axes, strict=True)])
+    if np.mean(facing > 0.0) > 0.5:
+        # Beside a thin wall the nearest sample may be of its other face: half of the contacts are no
+        # majority, and a contact alone is believed where a wall's other face is near.
+        if len(members) == 1:
+            near = surface.normals[surface.tree.query_ball_point(points[0], _WALL)]
+            if (near @ axes[0] < -0.5).any():
+                return
         worst = int(members[np.argmax(facing)])
         raise FitRefused(
             f"the object is inside out: its normals point away from the gel at most contacts, the worst is "
@@ -145,22 +161,6 @@ def refuse_inside_out(search: Search, one: Hypotheses, members: IntArray) -> Non
             f"{np.degrees(np.arccos(min(1.0, float(facing.max())))):.0f} degrees (at least 90 wanted); "
             "turn the faces of the mesh"
         )
-
-
-def _facing(search: Search, contact: int, one: Hypotheses) -> float:
-    """Cosine between the tool's axis and the outward normal at a contact; -1 for a square press."""
-    point = search.surface_points(contact, one)[0]
-    normal = search.surface.normals[search.surface.tree.query(point)[1]]
-    axis = search.prior.object_from_base(one.yaws)[0] @ search.contacts[contact].axis
-    return float(normal @ axis)
-
-
-def _walled(search: Search, contact: int, one: Hypotheses) -> bool:
-    """Whether a face that looks at the tool is no farther than a thin wall's thickness."""
-    point = search.surface_points(contact, one)[0]
-    near = search.surface.normals[search.surface.tree.query_ball_point(point, _WALL)]
-    axis = search.prior.object_from_base(one.yaws)[0] @ search.contacts[contact].axis
-    return bool((near @ axis < -0.5).any())
 
 
 def _repeated(search: Search, contact: int) -> int | None:

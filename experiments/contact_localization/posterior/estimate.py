@@ -39,8 +39,7 @@ from experiments.contact_localization.posterior.posterior import (
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.sound.consistency import (
     distinct_strikes,
-    doubts_of_sound_at,
-    refuse_strange_sound,
+    judge_sound,
 )
 from experiments.contact_localization.sound.evidence import StrikeEvidence, by_sound, hear
 from harness.basics.arrays import FloatArray, IntArray, read_only
@@ -138,6 +137,11 @@ class Estimate:
     hypotheses: Hypotheses
     doubts: tuple[str, ...] = ()
     strain: float = 0.0
+
+    @property
+    def times_stated(self) -> float:
+        """How many times as large as stated the bench's errors are taken to be; 1 up to ``STRAINED``."""
+        return 1.0 if self.strain <= STRAINED else min(self.strain, MOST)
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,8 +242,7 @@ def _judged(
     start = time.perf_counter()
     doubts: tuple[str, ...] = ()
     if heard is not None:
-        judge = refuse_strange_sound if accuracy.of(SENSES) == "audio" else doubts_of_sound_at
-        doubts = judge(search, found.hypotheses, heard, count)
+        doubts = judge_sound(search, found.hypotheses, heard, count, accuracy.of(SENSES) == "audio")
     # The paper's filter has no measure of fit to be refused by.
     if accuracy.of(METHOD) == "grid" and found.pictured:
         refuse_bad_fit(search, found.members, found.fits)
@@ -291,7 +294,12 @@ def _everywhere(
     search: Search, count: int, found: PosteriorSolution
 ) -> tuple[Hypotheses, list[FloatArray], IntArray]:
     """Hypotheses spread over turns that the object does not show, contacts' points, and whose each is."""
-    hypotheses, clouds = found.hypotheses, [_points(search, k, found) for k in range(count)]
+    hypotheses, surface = found.hypotheses, search.surface
+    if found.pictured:
+        clouds = [search.surface_points(k, hypotheses) for k in range(count)]
+    else:
+        places = [search.contact_places(k, hypotheses) for k in range(count)]
+        clouds = [surface.points[surface.tree.query(each)[1]] for each in places]
     if search.turning is None:
         return hypotheses, clouds, np.arange(len(hypotheses.yaws))
     owners, turns, weights = search.turning.copies(hypotheses.weights, _TURNED)
@@ -299,13 +307,6 @@ def _everywhere(
     yaws, logs = hypotheses.yaws[owners] - turns, np.log(np.maximum(weights, 1e-300))
     spread = Hypotheses(hypotheses.gels[owners], yaws, logs - logs.max())
     return spread, [search.turning.turned(cloud[owners], turns) for cloud in clouds], owners
-
-
-def _points(search: Search, contact: int, found: PosteriorSolution) -> FloatArray:
-    if found.pictured:
-        return search.surface_points(contact, found.hypotheses)
-    places = search.contact_places(contact, found.hypotheses)
-    return search.surface.points[search.surface.tree.query(places)[1]]
 
 
 def _together(clouds: Sequence[FloatArray], hypotheses: Hypotheses) -> tuple[FloatArray, int]:
@@ -345,7 +346,10 @@ def solve_run(
     """
     if accuracy.of(SENSES) == "audio":
         assert heard is not None
-        return _by_sound(search, count, heard, seconds)
+        start = time.perf_counter()
+        by_places = by_sound(search, heard.term, heard.struck, np.arange(count, dtype=np.int64))
+        lap(seconds, "grid", start)
+        return PosteriorSolution(by_places, np.empty(0, dtype=np.int64), np.empty(0), pictured=False)
     members = search.members(count)
     if len(members) == 0:
         refuse_bad_fit(search, members, np.empty(0))
@@ -383,16 +387,6 @@ def _by_grid(
     fits = search.gates(refined.top, members)
     lap(seconds, "refine", start)
     return PosteriorSolution(refined, members, fits)
-
-
-def _by_sound(
-    search: Search, count: int, heard: StrikeEvidence, seconds: dict[str, float]
-) -> PosteriorSolution:
-    start = time.perf_counter()
-    everyone = np.arange(count, dtype=np.int64)
-    found = by_sound(search, heard.term, heard.struck, everyone)
-    lap(seconds, "grid", start)
-    return PosteriorSolution(found, np.empty(0, dtype=np.int64), np.empty(0), pictured=False)
 
 
 def _by_particles(
@@ -433,8 +427,3 @@ def strain_of(search: Search, hypotheses: Hypotheses, fits: FloatArray) -> float
         squares += float(hypotheses.weights @ (hypotheses.yaws / search.prior.yaw_sigma) ** 2)
         expected += 1.0
     return float(np.sqrt(squares / expected))
-
-
-def times_stated(strain: float) -> float:
-    """How many times as large as stated errors are taken to be; 1 where the fit does not contradict them."""
-    return 1.0 if strain <= STRAINED else min(strain, MOST)

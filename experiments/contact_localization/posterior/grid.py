@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
 
-from experiments.contact_localization.posterior.hypotheses import Hypotheses, best_of, normalised
+from experiments.contact_localization.posterior.hypotheses import Hypotheses, best_of, normalised, systematic
 from experiments.contact_localization.posterior.noise import UNKNOWNS, log_prior
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.sound.evidence import StrikeEvidence
@@ -14,16 +14,28 @@ from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from harness.basics.compiled import compiled
 
 _DROPPED_AT = 18.0
+
+
 _WORTH_A_LOOK = 12.0
+
+
 _MOST_LOOKS = 3000
+
+
 _FILLED = 8000
 """Hypotheses up to which a grid is filled between its samples where the yaw is unknown: steps of 2 mm and 2
 degrees leave a sharp place with a hypothesis or two, each millimetres aside."""
 
+
 _MOST_COPIES = 16
+
+
 _DRAWS_EACH = 2.0
+
+
 _ENOUGH = 0.05
 """Of a round's draws, effective."""
+
 
 _FILLS = 200.0
 """Effective samples of the grid that fill a region 2 mm apart so well that draws need not."""
@@ -134,38 +146,48 @@ def between_samples(search: Search, anchor: int, at: Hypotheses, copies: int) ->
     # From the gel's centre at the first contact to the anchor's place on the surface.
     reach = search.positions[anchor] - search.contacts[anchor].indentation * search.axes[anchor]
     samples = at.gels + search.prior.object_from_base(at.yaws) @ reach
-    places = samples[copied] + search.surface.spacing * _across(turned @ search.axes[anchor], spread[:, :2])
+    axes = turned @ search.axes[anchor]
+    # Two directions square to each other and to the tool's axis.
+    first = np.cross(axes, np.eye(3)[np.argmin(np.abs(axes), axis=1)])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    across = spread[:, :1] * first + spread[:, 1:2] * np.cross(axes, first)
+    places = samples[copied] + search.surface.spacing * across
     return Hypotheses(places - turned @ reach, yaws, at.log_weights[copied])
 
 
-def _across(axes: FloatArray, amounts: FloatArray) -> FloatArray:
-    """``(n, 3)``: ``(n, 2)`` amounts along two directions square to each other and to unit ``axes``."""
-    first = np.cross(axes, np.eye(3)[np.argmin(np.abs(axes), axis=1)])
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.asarray(amounts[:, :1] * first + amounts[:, 1:] * np.cross(axes, first))
-
-
 _PLACE = (0.8e-3, 0.8e-3, 0.6e-3)
+
+
 _YAW_KNOWN = np.radians(0.8)
+
+
 _YAW_UNKNOWN = np.radians(1.5)
 """The first round's widths, metres and rad; of all that follows the units. Shared errors are in sigmas."""
+
 
 _NARROW = 0.65
 """Times as wide in place and yaw is what is taken to be known of a round's shape before it is looked at."""
 
+
 _NEIGHBOURS = 5.0
 """Units within which two hypotheses are of one neighbourhood: 4 mm, or 4 degrees where the yaw is known."""
 
+
 _LOOKED_AT = 300
+
+
 _SMOOTHING = 0.7
 """Times as wide as its neighbourhood is a place's Gaussian: what a few hundred hypotheses are smoothed by
 (Silverman, Density Estimation, 1986, section 4.3)."""
 
+
 _STEP = 0.75
 """Of the shared errors between rounds, in their spread; 1 forgets the parents."""
 
+
 _BELIEVED = 20.0
 """Hypotheses that the shape known beforehand counts for."""
+
 
 _FLATTENED = (4.0, 2.0)
 """Where the yaw is unknown, what the first rounds' nats are divided by before parents are chosen: a grid of
@@ -236,6 +258,18 @@ class _Shape:
         mean = counts * shared.mean(axis=0)
         return cls(carried, np.linalg.cholesky(left), np.linalg.cholesky(both[axes:, axes:]), mean)
 
+    def whitened(self, places: FloatArray, shared: FloatArray) -> FloatArray:
+        """``(n, d + 6)``, in which a draw is one standard normal step from its parent."""
+        left = solve_triangular(_SMOOTHING * self.left, (places - shared @ self.carried.T).T, lower=True)
+        errors = solve_triangular(_STEP * self.shared, (shared - self.mean).T, lower=True)
+        return np.ascontiguousarray(np.vstack([left, errors]).T)
+
+    def unwhitened(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Places in units and shared errors in sigmas, of points as ``whitened`` gives them."""
+        shared = self.mean + points[:, -UNKNOWNS:] @ (_STEP * self.shared).T
+        places = points[:, :-UNKNOWNS] @ (_SMOOTHING * self.left).T + shared @ self.carried.T
+        return places, shared
+
 
 def of_pairs(points: FloatArray, near: BoolArray) -> tuple[FloatArray, int]:
     """``(d, d)``: the sum of ``(a - b)(a - b)^T`` over ordered pairs of ``(n, d)`` points, and their number.
@@ -270,7 +304,10 @@ def drawn(
     """
     axes = _Axes(search, search.positions[members].mean(axis=0))
     places, weights = axes.of(current), current.weights
-    chosen = systematic(_chosen_by(search, current, attempt), draws, rng)
+    # A grid of an unknown yaw may hold little of a mode: the first rounds choose by flatter weights.
+    flat = search.prior.yaw == "unknown" and attempt < len(_FLATTENED)
+    odds = normalised(current.log_weights / _FLATTENED[attempt]) if flat else weights
+    chosen = systematic(odds, draws, rng)
     parents, repeats = np.unique(chosen, return_counts=True)
     steps = rng.normal(size=(draws, places.shape[1])), rng.normal(size=(draws, UNKNOWNS))
     if current.shared is None:
@@ -279,39 +316,12 @@ def drawn(
         return axes.hypotheses(points, steps[1], log_density)
     few = systematic(weights, _LOOKED_AT, rng)
     shape = _Shape.of(places[few], current.shared[few], current.effective, _NARROW**attempt)
-    centres = _whitened(shape, places[parents], current.shared[parents])
+    centres = shape.whitened(places[parents], current.shared[parents])
     # Drawn towards their mean by what the step adds, shared errors keep their spread.
     centres[:, -UNKNOWNS:] *= np.sqrt(1.0 - _STEP**2)
     points = np.repeat(centres, repeats, axis=0) + np.hstack(steps)
     log_density = _mixture(points, centres, repeats / draws)
-    return axes.hypotheses(*_unwhitened(shape, points), log_density)
-
-
-def _chosen_by(search: Search, current: Hypotheses, attempt: int) -> FloatArray:
-    """``(n,)`` shares of the draws: the weights, flatter in the first rounds where the yaw is unknown."""
-    if search.prior.yaw == "known" or attempt >= len(_FLATTENED):
-        return current.weights
-    return normalised(current.log_weights / _FLATTENED[attempt])
-
-
-def systematic(weights: FloatArray, count: int, rng: np.random.Generator) -> IntArray:
-    """``(count,)`` rising indices, each as often as its weight asks for, but for one."""
-    marks = (np.arange(count) + rng.random()) / count
-    return np.minimum(np.searchsorted(np.cumsum(weights), marks), len(weights) - 1).astype(np.int64)
-
-
-def _whitened(shape: _Shape, places: FloatArray, shared: FloatArray) -> FloatArray:
-    """``(n, d + 6)``, in which a draw is one standard normal step from its parent."""
-    left = solve_triangular(_SMOOTHING * shape.left, (places - shared @ shape.carried.T).T, lower=True)
-    errors = solve_triangular(_STEP * shape.shared, (shared - shape.mean).T, lower=True)
-    return np.ascontiguousarray(np.vstack([left, errors]).T)
-
-
-def _unwhitened(shape: _Shape, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Places in units and shared errors in sigmas, of points as ``_whitened`` gives them."""
-    shared = shape.mean + points[:, -UNKNOWNS:] @ (_STEP * shape.shared).T
-    places = points[:, :-UNKNOWNS] @ (_SMOOTHING * shape.left).T + shared @ shape.carried.T
-    return places, shared
+    return axes.hypotheses(*shape.unwhitened(points), log_density)
 
 
 @compiled

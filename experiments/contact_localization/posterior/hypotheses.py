@@ -127,6 +127,12 @@ def normalised(log_weights: FloatArray) -> FloatArray:
     return np.asarray(weights / weights.sum())
 
 
+def systematic(weights: FloatArray, count: int, rng: np.random.Generator) -> IntArray:
+    """``(count,)`` rising indices, each as often as its weight asks for, but for one."""
+    marks = (np.arange(count) + rng.random()) / count
+    return np.minimum(np.searchsorted(np.cumsum(weights), marks), len(weights) - 1).astype(np.int64)
+
+
 def best_of(log_weights: FloatArray, within: float, most: int) -> IntArray:
     """Rising indices within so many nats of the best; of more than ``most``, an even choice of ``most``.
 

@@ -95,14 +95,33 @@ def noise_at(errors: BenchErrors) -> Noise:
     Args:
         errors: of the bench, as its station states them.
     """
-    noise, place, turn = Noise(), _ratio(errors, "arm", "gel_centre"), _turn(errors)
+    noise = Noise()
+    place, own = _ratio(errors, "arm", "gel_centre"), _ratio(errors, "arm")
+    turn = _ratio(errors, "yaw", "tilt", "gel_tilt", "arm_tilt")  # all that turns the gel against the surface
+    touch = replace(
+        noise.touch,
+        rms=noise.touch.rms * _ratio(errors, "gel_depth"),
+        tilt=noise.touch.tilt * turn,
+        spin=noise.touch.spin * _ratio(errors, "gel_yaw"),
+        shift=noise.touch.shift * place,
+        depth=noise.touch.depth * place,
+    )
+    shared = replace(
+        noise.shared,
+        tilt=errors.tilt,
+        scale=errors.scale,
+        gel_centre=errors.gel_centre,
+        shift=noise.shared.shift * own,
+        depth=noise.shared.depth * own,
+        per_metre=noise.shared.per_metre * own,
+    )
     return replace(
         noise,
         geometry=_geometry(noise.geometry, errors, place, turn),
         unread=_geometry(noise.unread, errors, place, turn),
-        touch=_touch(noise.touch, errors, place, turn),
-        shared=_shared(noise.shared, errors),
-        floor=noise.floor * _ratio(errors, "arm"),
+        touch=touch,
+        shared=shared,
+        floor=noise.floor * own,
     )
 
 
@@ -110,11 +129,6 @@ def _ratio(errors: BenchErrors, *names: str) -> float:
     """Of errors that add in squares, over the usual ones."""
     ours, usual = (np.linalg.norm([getattr(some, name) for name in names]) for some in (errors, USUAL))
     return float(ours / usual)
-
-
-def _turn(errors: BenchErrors) -> float:
-    """Of all that turns the gel against the object's surface."""
-    return _ratio(errors, "yaw", "tilt", "gel_tilt", "arm_tilt")
 
 
 def _geometry(noise: GeometryNoise, errors: BenchErrors, place: float, turn: float) -> GeometryNoise:
@@ -127,38 +141,12 @@ def _geometry(noise: GeometryNoise, errors: BenchErrors, place: float, turn: flo
     )
 
 
-def _touch(noise: TouchNoise, errors: BenchErrors, place: float, turn: float) -> TouchNoise:
-    return replace(
-        noise,
-        rms=noise.rms * _ratio(errors, "gel_depth"),
-        tilt=noise.tilt * turn,
-        spin=noise.spin * _ratio(errors, "gel_yaw"),
-        shift=noise.shift * place,
-        depth=noise.depth * place,
-    )
-
-
-def _shared(noise: SharedNoise, errors: BenchErrors) -> SharedNoise:
-    own = _ratio(errors, "arm")
-    return replace(
-        noise,
-        tilt=errors.tilt,
-        scale=errors.scale,
-        gel_centre=errors.gel_centre,
-        shift=noise.shift * own,
-        depth=noise.depth * own,
-        per_metre=noise.per_metre * own,
-    )
-
-
 SAME_PLACE = 1.5e-3
 """Metres between two presses that count as one place."""
 
+
 SAME_AXIS = np.radians(4.0)
 """rad between their tools."""
-
-_CAP_ALONE = 1000.0
-"""Nats: beyond what any place that fits costs, and a number where none does."""
 
 
 def contact_scales(
@@ -183,7 +171,10 @@ def contact_scales(
     own = place_noise(noise, named)
     reach = np.linalg.norm(positions[members] - positions[members].mean(axis=0), axis=1)
     sigmas = np.hypot(own.shift, (noise.shared.per_metre if named else per_metre) * reach)
-    temperatures = noise.temperature / _alike(positions[members], axes[members]).sum(axis=1)
+    # Presses repeated at one place share their errors: their images together count as one.
+    gaps = np.linalg.norm(positions[members][:, None] - positions[members][None], axis=2)
+    alike = (gaps < SAME_PLACE) & (axes[members] @ axes[members].T > np.cos(SAME_AXIS))
+    temperatures = noise.temperature / np.asarray(alike, dtype=np.float64).sum(axis=1)
     for k, sigma, temperature in zip(members, sigmas, temperatures, strict=True):
         yield int(k), float(sigma), float(temperature)
 
@@ -193,18 +184,3 @@ def place_noise(noise: Noise, named: bool) -> TouchNoise:
     if not named:
         return noise.touch
     return replace(noise.touch, shift=noise.shared.shift, depth=noise.shared.depth)
-
-
-def cap_of(noise: TouchNoise, contacts: int) -> float:
-    """Nats that each of so many contacts may cost: one alone is no outlier.
-
-    An outlier fits every place alike, and where other contacts fit they say where it was. Of a contact alone
-    it would make all places alike, of which there are many more than such as fit.
-    """
-    return noise.cap if contacts > 1 else _CAP_ALONE
-
-
-def _alike(positions: FloatArray, axes: FloatArray) -> FloatArray:
-    """``(m, m)``: presses repeated at one place share their errors: their images together count as one."""
-    gaps = np.linalg.norm(positions[:, None] - positions[None], axis=2)
-    return np.asarray((gaps < SAME_PLACE) & (axes @ axes.T > np.cos(SAME_AXIS)), dtype=np.float64)

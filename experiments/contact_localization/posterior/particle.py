@@ -11,18 +11,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.posterior.hypotheses import normalised
+from experiments.contact_localization.posterior.hypotheses import normalised, systematic
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.touch.touch import similarities
+from experiments.contact_localization.touch.kernels import similarities_at
 from harness.basics.arrays import FloatArray, IntArray
 
 Similarity = Callable[[int, IntArray, FloatArray], FloatArray | None]
 """Of a contact's reading to what particles would read, from the contact's index, the particles' ``(n,)``
 samples and ``(n,)`` yaws: ``(n,)`` from -1 to 1; None for a contact that says nothing."""
 
+
+_BEHIND = 1.5e-3
+"""Metres behind the first surface at which a place cannot be touched, and its similarity is 0."""
+
+
 CANDIDATES = 10
+
+
 _EVERY = 5
 """Of the grid's yaws one in five: the filter's cosine hardly changes over 10 degrees."""
+
 
 TEMPERATURE = 0.05
 """Of the weight ``exp(cosine / temperature)``; the paper states none, with 1 it hardly converges."""
@@ -62,10 +70,21 @@ def particle_filter(search: Search, count: int, particles: int, seed: int) -> Pa
         seed: of the start and of the resampling.
     """
 
-    def felt(k: int, at: IntArray, yaws: FloatArray) -> FloatArray | None:
-        return _similarity(search, k, at, yaws) if search.contacts[k].shows_contact else None
+    def similarity(contact: int, at: IntArray, yaws: FloatArray) -> FloatArray | None:
+        """Cosines between what the gel read and what it would have read at each particle."""
+        if not search.contacts[contact].shows_contact:
+            return None
+        reading, points, pictures = search.touch(contact).reading, surface.points[at], search.pictures(yaws)
+        result = np.zeros(len(at))
+        for picture in np.unique(pictures):
+            chosen = np.nonzero(pictures == picture)[0]
+            view = search.view(contact, int(picture))
+            places = points[chosen] @ view.object_from_view
+            result[chosen] = similarities_at(view.origin, view.pitch, view.depth, reading, places, _BEHIND)
+        return result
 
-    return filtered(search, count, felt, particles, seed)
+    surface = search.surface
+    return filtered(search, count, similarity, particles, seed)
 
 
 def filtered(
@@ -87,50 +106,21 @@ def filtered(
     rng = np.random.default_rng(seed)
     surface = search.surface
     at = rng.choice(len(surface.points), size=particles, p=surface.areas / surface.areas.sum())
-    yaws = _first_yaws(search, particles, rng)
+    yaws = np.zeros(particles)
+    if search.prior.yaw == "unknown":
+        few = search.yaws[::_EVERY]
+        yaws = few[rng.integers(0, len(few), particles)]
     log_weights = np.zeros(particles)
     for k in range(count):
         if k > 0:
-            at, yaws, log_weights = _resampled(at, yaws, log_weights, rng)
+            weights = normalised(log_weights)
+            if 1.0 / np.sum(weights**2) < 0.5 * particles:
+                chosen = systematic(weights, particles, rng)
+                at, yaws, log_weights = at[chosen], yaws[chosen], np.zeros(particles)
             moved = search.prior.object_from_base(yaws) @ (search.positions[k] - search.positions[k - 1])
-            at = _nearest(search, surface.points[at] + moved)
+            at = np.asarray(surface.tree.query(surface.points[at] + moved)[1], dtype=np.int64)
         alike = similarity(k, at, yaws)
         if alike is not None:
             log_weights = log_weights + alike / TEMPERATURE
             log_weights -= log_weights.max()
     return Particles(surface.points[at], yaws, log_weights)
-
-
-def _first_yaws(search: Search, count: int, rng: np.random.Generator) -> FloatArray:
-    if search.prior.yaw == "known":
-        return np.zeros(count)
-    few = search.yaws[::_EVERY]
-    return np.asarray(few[rng.integers(0, len(few), count)])
-
-
-def _similarity(search: Search, contact: int, at: IntArray, yaws: FloatArray) -> FloatArray:
-    result = np.zeros(len(at))
-    points = search.surface.points[at]
-    pictures = search.pictures(yaws)
-    for picture in np.unique(pictures):
-        chosen = np.nonzero(pictures == picture)[0]
-        view = search.view(contact, int(picture))
-        places = points[chosen] @ view.object_from_view
-        result[chosen] = similarities(view, search.touch(contact), places)
-    return result
-
-
-def _resampled(
-    at: IntArray, yaws: FloatArray, log_weights: FloatArray, rng: np.random.Generator
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    weights = normalised(log_weights)
-    count = len(at)
-    if 1.0 / np.sum(weights**2) >= 0.5 * count:
-        return at, yaws, log_weights
-    marks = (np.arange(count) + rng.random()) / count
-    chosen = np.minimum(np.searchsorted(np.cumsum(weights), marks), count - 1)
-    return at[chosen], yaws[chosen], np.zeros(count)
-
-
-def _nearest(search: Search, points: FloatArray) -> IntArray:
-    return np.asarray(search.surface.tree.query(points)[1], dtype=np.int64)

@@ -8,12 +8,26 @@ from harness.basics.arrays import BoolArray, FloatArray, read_only
 from harness.sim.solid.surface_samples import Surface
 
 _GROSS = 20.0e-3
+
+
 _MODE_RADIUS = 12.0e-3
+
+
 _SMALLEST_MODE = 0.05
+
+
 _MOST_POINTS = 400
+
+
 _MOST_IN_REGION = 4000
+
+
 _CORE = 6.0e-3
+
+
 _SETTLING = 8
+
+
 _GOLDEN = 0.6180339887498949
 
 
@@ -114,7 +128,11 @@ def modes(points: FloatArray, weights: FloatArray) -> tuple[Mode, ...]:
             break
         weight = float(left[members].sum())
         if weight >= _SMALLEST_MODE:
-            found.append(_mode(points[members], left[members], weight))
+            shares = left[members] / weight
+            mean = shares @ points[members]
+            centred = points[members] - mean
+            covariance = (centred * shares[:, None]).T @ centred
+            found.append(Mode(read_only(mean), weight, read_only(covariance)))
         left[members] = 0.0
     return tuple(sorted(found, key=lambda mode: -mode.weight))
 
@@ -168,10 +186,3 @@ def credible_radius(
     within = float(gaps[order][min(int(np.searchsorted(reached, share)), len(gaps) - 1)])
     # 2.15 sigma holds 90 % of a Gaussian on a surface (Rayleigh).
     return float(np.hypot(within, floor * np.sqrt(-2.0 * np.log(1.0 - share))))
-
-
-def _mode(points: FloatArray, weights: FloatArray, weight: float) -> Mode:
-    shares = weights / weight
-    mean = shares @ points
-    centred = points - mean
-    return Mode(read_only(mean), weight, read_only((centred * shares[:, None]).T @ centred))

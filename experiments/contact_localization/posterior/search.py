@@ -15,13 +15,11 @@ from experiments.contact_localization.posterior.hypotheses import Contact, Hypot
 from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores, possible_anchors
 from experiments.contact_localization.posterior.noise import (
     Noise,
-    cap_of,
     contact_scales,
     log_prior,
     moves,
     place_noise,
 )
-from experiments.contact_localization.touch.kernels import turns_between
 from experiments.contact_localization.touch.touch import TouchMap, best_fit, touch_terms
 from harness.basics.arrays import FloatArray, IntArray
 from harness.bench.bench_errors import USUAL
@@ -32,13 +30,26 @@ _YAWS_TO = 5
 """Degrees from the nominal yaw to the last of the grid's, where it is known as well as usual; in proportion
 to its sigma."""
 
+
 _YAW_STEP = 2.0
 """Degrees between the yaws of the grid, and between pictures, where the yaw is unknown."""
 
+
 _PICTURES = round(360.0 / _YAW_STEP)
+
+
 _SHARED_COARSELY = 3
+
+
 _MANY_PICTURES = 45
+
+
 _PRUNE = 30.0
+
+
+_CAP_ALONE = 1000.0
+"""Nats: beyond what any place that fits costs, and a number where none does."""
+
 
 MOST_HYPOTHESES = 20_000
 """That a grid keeps; of more, an even choice."""
@@ -58,8 +69,14 @@ class Search:
         self.geometry = noise.geometry if read else noise.unread
         self.surface: Surface = model.surface(spacing)
         self.turning = model.turning(prior.up) if prior.yaw == "unknown" else None
-        known = _yaws_about(prior.yaw_sigma)
-        self.yaws = known if self.turning is None else _yaws_over(self.turning.period)
+        if self.turning is None:
+            # About the nominal yaw, a degree apart: at least those of the usual sigma.
+            to = _YAWS_TO * max(1, int(np.ceil(prior.yaw_sigma / USUAL.yaw)))
+            self.yaws = np.radians(np.arange(-to, to + 0.5, 1.0))
+        else:
+            # Over one period of the object; one where every yaw is alike.
+            period = np.degrees(self.turning.period)
+            self.yaws = np.radians(np.arange(0.0, max(period, 1e-9), _YAW_STEP))
         self._rough = False
         self.positions = np.array([contact.base_from_gel[:3, 3] for contact in contacts])
         self.positions -= self.positions[0]
@@ -146,7 +163,9 @@ class Search:
             within: nats behind the best at which a hypothesis is dropped as contacts come in.
         """
         at = at.told(self.log_yaw_prior(at.yaws) + log_prior(at.shared))
-        cells, cap = max(1, step // 2) if self._rough else step, cap_of(self.noise.touch, len(members))
+        cells = max(1, step // 2) if self._rough else step
+        # An outlier fits every place alike. One contact alone is no outlier: no others say where it was.
+        cap = self.noise.touch.cap if len(members) > 1 else _CAP_ALONE
         for k, sigma, temperature in self._scales(members, at.shared is not None):
             term = self._term(k, at, cells, rings, sigma, temperature, self._rough, cap)
             at = at.told(term).best(within, len(term))
@@ -306,12 +325,16 @@ class Search:
         return np.asarray(numbers.astype(np.int64) % _PICTURES)
 
 
-def _yaws_about(sigma: float) -> FloatArray:
-    """The grid's yaws in rad about the nominal one, a degree apart: at least those of the usual ``sigma``."""
-    to = _YAWS_TO * max(1, int(np.ceil(sigma / USUAL.yaw)))
-    return np.asarray(np.radians(np.arange(-to, to + 0.5, 1.0)))
+def turns_between(base_from_gel: FloatArray, turns: FloatArray) -> FloatArray:
+    """How the gel stands against one that looks upon an object turned by so much less about base z.
 
+    Args:
+        base_from_gel: ``(3, 3)`` rotation.
+        turns: ``(n,)`` rad, small.
 
-def _yaws_over(period: float) -> FloatArray:
-    """The grid's yaws in rad over one period of the object; one where every yaw is alike."""
-    return np.radians(np.arange(0.0, max(np.degrees(period), 1e-9), _YAW_STEP))
+    Returns:
+        ``(n, 3)`` to first order: the gel's slopes along x and y of its picture, and its turn in that plane.
+    """
+    # The object turned one way is the gel turned the other, about z as the gel has it.
+    x, y, z = -base_from_gel[2]
+    return np.outer(turns, np.array([y, -x, z]))

@@ -1,6 +1,6 @@
 """Fill the report of a run from its folder, its answer and, for a mocked run, its truth."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -95,7 +95,7 @@ def report_of(scored: Scored, comparison: Comparison, health: Mapping[str, Healt
         comparison: what the scene observes, simulated at the answer.
         health: of the instruments at the end of the session; None for a replay.
     """
-    run, found = scored.run, scored.found
+    run, found, true = scored.run, scored.found, true_points(scored)
     history = scored.answering.history(found.last, found.sense)
     return ReportData(
         **facts_of("Contact localization", scored, comparison, health, _ours(scored)),
@@ -104,7 +104,7 @@ def report_of(scored: Scored, comparison: Comparison, health: Mapping[str, Healt
         contacts=_contacts(scored, comparison, history),
         bench=_bench(run, found),
         error_by_contact=_by_contact(scored, history),
-        error_by_seconds=_by_seconds(_sweep(scored)),
+        error_by_seconds=_by_seconds(() if true is None else trade(scored.answering.readings, true[-1])),
         twin=deviations(run, found),
         sound=sound_of(scored),
         symmetry=scored.answering.symmetry.name,
@@ -132,8 +132,9 @@ def _answer(scored: Scored) -> AnswerRow:
 def _contacts(
     scored: Scored, comparison: Comparison, history: tuple[Estimate | FitRefused, ...]
 ) -> tuple[ContactRow, ...]:
-    images = _of_each(comparison, "touch.image", len(history))
-    gels = _of_each(comparison, "touch.gel", len(history))
+    count = len(history)
+    images, gels = _of_each(comparison, "touch.image", count), _of_each(comparison, "touch.gel", count)
+    gates: tuple[Gate | None, ...] = scored.found.last.gates or (None,) * count
     poses, true = object_from_gels(scored.found), true_points(scored)
     return tuple(
         ContactRow(
@@ -150,7 +151,7 @@ def _contacts(
             flags=() if gate is None else tuple(flags_of(gate, scored.found.refused_pictures.get(k))),
             notes=(("fit", _fit(gate)), *_expected(scored.run, k)),
         )
-        for k, (after, gate) in enumerate(zip(history, _gates(scored.found, len(history)), strict=True))
+        for k, (after, gate) in enumerate(zip(history, gates, strict=True))
     )
 
 
@@ -167,10 +168,6 @@ def _of_each(comparison: Comparison, name: str, count: int) -> list[Any]:
     if name in values:
         return list(values[name])
     return [Missing(f"the scene's observe does not ask for {name}")] * count
-
-
-def _gates(found: Found, count: int) -> tuple[Gate | None, ...]:
-    return found.last.gates or (None,) * count
 
 
 def _fit(gate: Gate | None) -> str:
@@ -212,19 +209,18 @@ def _by_contact(
     if true is None:
         return NO_TRUTH
     counts = tuple(float(k + 1) for k in range(len(true)))
-    alone = _errors([by_translations(found, k + 1) for k in range(len(true))], true)
+    alone = tuple(float(np.linalg.norm(by_translations(found, k + 1) - at)) for k, at in enumerate(true))
+    # The same readings after each contact by each other sense that answered in the end.
+    others = [
+        _curve(sense, scored.answering.history(last, sense), true)
+        for sense, last in found.others.items()
+        if not isinstance(last, FitRefused)
+    ]
     return (
         _curve(found.sense, history, true),
-        *_by_other_senses(scored, true),
+        *others,
         ErrorCurve("translations alone, no image", counts, alone, by="geometry"),
     )
-
-
-def _by_other_senses(scored: Scored, true: FloatArray) -> Iterator[ErrorCurve]:
-    """The same readings after each contact by each other sense that answered in the end."""
-    for sense, last in scored.found.others.items():
-        if not isinstance(last, FitRefused):
-            yield _curve(sense, scored.answering.history(last, sense), true)
 
 
 def _curve(sense: Senses, history: tuple[Estimate | FitRefused, ...], true: FloatArray) -> ErrorCurve:
@@ -234,46 +230,28 @@ def _curve(sense: Senses, history: tuple[Estimate | FitRefused, ...], true: Floa
     return ErrorCurve(SENSES[sense], tuple(known), tuple(known.values()), by=sense)
 
 
-def _errors(points: Sequence[FloatArray], true: FloatArray) -> tuple[float, ...]:
-    """m, contact by contact."""
-    return tuple(float(np.linalg.norm(point - at)) for point, at in zip(points, true, strict=True))
-
-
-def _sweep(scored: Scored) -> tuple[SweepPoint, ...]:
-    true = true_points(scored)
-    return () if true is None else trade(scored.answering.readings, true[-1])
-
-
-def _by_seconds(trade: tuple[SweepPoint, ...]) -> tuple[ErrorCurve, ...] | Missing:
-    if not trade:
+def _by_seconds(tried: tuple[SweepPoint, ...]) -> tuple[ErrorCurve, ...] | Missing:
+    if not tried:
         return NO_TRUTH
-    methods: dict[str, list[SweepPoint]] = {}
-    heard = any(point.accuracy.of(BY) == "audio" for point in trade)
-    for point in trade:
-        methods.setdefault(_method(point.accuracy, heard), []).append(point)
+    methods: dict[tuple[str, str], list[SweepPoint]] = {}
+    heard = any(point.accuracy.of(BY) == "audio" for point in tried)
+    for point in tried:
+        sense = point.accuracy.of(BY)
+        if point.accuracy.of(METHOD) == "particle":
+            method = "the paper's particle filter", "particle"
+        else:
+            method = (f"grid, {SENSES[sense]}", sense) if heard else ("grid", "touch")
+        methods.setdefault(method, []).append(point)
     return tuple(
         ErrorCurve(
             name,
             tuple(point.seconds_a_contact for point in points),
             tuple(point.error for point in points),
             tuple(point.name for point in points),
-            by=_by(points[0].accuracy, heard),
+            by=by,
         )
-        for name, points in methods.items()
+        for (name, by), points in methods.items()
     )
-
-
-def _by(accuracy: Accuracy, heard: bool) -> str:
-    """What answers: the paper's filter, or a sense; of a run without sound all are touch."""
-    if accuracy.of(METHOD) == "particle":
-        return "particle"
-    return accuracy.of(BY) if heard else "touch"
-
-
-def _method(accuracy: Accuracy, heard: bool) -> str:
-    if accuracy.of(METHOD) == "particle":
-        return "the paper's particle filter"
-    return f"grid, {SENSES[accuracy.of(BY)]}" if heard else "grid"
 
 
 def _ours(scored: Scored) -> dict[str, str]:
@@ -359,11 +337,7 @@ def object_from_gels(found: Answer) -> FloatArray:
         found.observations, found.last.contacts, found.heights, strict=True
     ):
         rotation = object_from_base @ observation.base_from_gel[:3, :3]
-        poses.append(transform(rotation, point + _at_centre(height) * rotation[:, 2]))
+        rows, columns = height.shape
+        middle = height[(rows - 1) // 2 : rows // 2 + 1, (columns - 1) // 2 : columns // 2 + 1]
+        poses.append(transform(rotation, point + float(middle.mean()) * rotation[:, 2]))
     return read_only(np.array(poses))
-
-
-def _at_centre(height: FloatArray) -> float:
-    rows, columns = height.shape
-    middle = height[(rows - 1) // 2 : rows // 2 + 1, (columns - 1) // 2 : columns // 2 + 1]
-    return float(middle.mean())

@@ -10,7 +10,6 @@ from experiments.contact_localization.posterior.baselines import mean_random_err
 from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.posterior.posterior import Mode
 from experiments.contact_localization.sound.consistency import doubts_of_sound
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
@@ -21,7 +20,10 @@ from harness.experiment.experiment import Scored
 SAME_PLACE = 3.0e-3
 """Distance of two places modulo the object's symmetry below which they are one, m."""
 
+
 _NO_SOUND = "the object's sound is not compared, and touch alone answers"
+
+
 _LEFT_OUT = "its picture is left out"
 
 
@@ -38,6 +40,11 @@ def result_of(scored: Scored) -> dict[str, Any]:
     found: Answer = scored.found
     true = true_points(scored)
     last_true = None if true is None else true[-1]
+    random = geometry = None
+    by_places = by_translations(found, len(found.observations))
+    if last_true is not None:
+        random = mean_random_error(scored.run.mesh, last_true)
+        geometry = float(np.linalg.norm(by_places - last_true))
     return {
         "contacts": len(found.observations),
         "estimates": {
@@ -45,8 +52,8 @@ def result_of(scored: Scored) -> dict[str, Any]:
             for sense, one in found.by_sense.items()
         },
         "answer": found.sense,
-        "random_baseline_m": None if last_true is None else mean_random_error(scored.run.mesh, last_true),
-        "geometry_baseline_m": _distance(by_translations(found, len(found.observations)), last_true),
+        "random_baseline_m": random,
+        "geometry_baseline_m": geometry,
         "symmetry": scored.answering.symmetry.name,
         "seconds": found.seconds,
         "warnings": list(_doubts(found, scored.answering.symmetry)),
@@ -86,17 +93,13 @@ def further_contact(places: Sequence[FloatArray], symmetry: SymmetryGroup, mesh:
         mesh: the object.
     """
     distances = [symmetry.distance(places[0], place) for place in places[1:]]
-    if _is_ball(mesh, symmetry.tolerance) or max(distances) < SAME_PLACE:
+    radii = np.linalg.norm(mesh.vertices - 0.5 * mesh.bounds.sum(axis=0), axis=1)
+    is_ball = bool(np.ptp(radii) < 2.0 * symmetry.tolerance)
+    if is_ball or max(distances) < SAME_PLACE:
         return (
             "the object is the same at all of them by its symmetry, and no further contact distinguishes them"
         )
     return "one more contact elsewhere on the object can distinguish them"
-
-
-def _is_ball(mesh: Mesh, tolerance: float) -> bool:
-    """Check that every rotation about its centre leaves the surface unchanged."""
-    radii = np.linalg.norm(mesh.vertices - 0.5 * mesh.bounds.sum(axis=0), axis=1)
-    return bool(np.ptp(radii) < 2.0 * tolerance)
 
 
 def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
@@ -115,7 +118,14 @@ def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
         "credible90_m": last.credible90,
         "region90_area_m2": last.region.area,
         "in_region90": None if end is None else last.region.contains(end),
-        "modes": [_mode(mode) for mode in last.modes],
+        "modes": [
+            {
+                "position_m": mode.position.tolist(),
+                "weight": mode.weight,
+                "spread_m": float(np.sqrt(np.trace(mode.covariance))),
+            }
+            for mode in last.modes
+        ],
         "yaw_rad": last.yaw,
         "yaw_sigma_rad": last.yaw_sigma,
         "contacts": [
@@ -169,48 +179,32 @@ def _contact(
     }
 
 
-def _mode(mode: Mode) -> dict[str, Any]:
-    spread = float(np.sqrt(np.trace(mode.covariance)))
-    return {"position_m": mode.position.tolist(), "weight": mode.weight, "spread_m": spread}
-
-
-def _distance(point: FloatArray, true: FloatArray | None) -> float | None:
-    return None if true is None else float(np.linalg.norm(point - true))
-
-
 def answer_lines(result: Mapping[str, Any]) -> list[str]:
     """A line for each sense; the last one with the baselines."""
-    estimates = result["estimates"]
-    last = next(reversed(estimates))
-    return [answer_line(result, sense, baselines=sense == last) for sense in estimates]
+    lines = []
+    last = next(reversed(result["estimates"]))
+    for sense, found in result["estimates"].items():
+        if "refused" in found:
+            lines.append(f"{sense}: refused: {found['refused']}")
+            continue
+        x, y, z = (1e3 * value for value in found["position_m"])
+        place = f"({x:.1f}, {y:.1f}, {z:.1f}) mm on the {result['object']}"
+        said = [f"{sense}: contact {result['contacts']} at {place}"]
+        if found["error_m"] is not None:
+            symmetric = found["error_symmetric_m"]
+            modulo = f" ({_mm(symmetric)} modulo symmetry)" if symmetric < 0.9 * found["error_m"] else ""
+            said.append(f"error {_mm(found['error_m'])}{modulo}")
+        if len(found["modes"]) > 1:
+            said.append(f"{len(found['modes'])} likely places")
+        said += [f"90 % within {_mm(found['credible90_m'])}", f"{found['seconds']:.2f} s"]
+        if sense == last and result["geometry_baseline_m"] is not None:
+            said.append(
+                f"baselines: geometry alone {_mm(result['geometry_baseline_m'])}, "
+                f"random {_mm(result['random_baseline_m'])}"
+            )
+        lines.append(("mock bench, " if result["mock"] else "") + "; ".join(said))
+    return lines
 
 
-def answer_line(result: Mapping[str, Any], sense: str, baselines: bool) -> str:
-    """The answer, its error where the truth is known, how sure it is, what it took, the baselines."""
-    found = result["estimates"][sense]
-    if "refused" in found:
-        return f"{sense}: refused: {found['refused']}"
-    x, y, z = (1e3 * value for value in found["position_m"])
-    said = [
-        f"{sense}: contact {result['contacts']} at ({x:.1f}, {y:.1f}, {z:.1f}) mm on the {result['object']}"
-    ]
-    if found["error_m"] is not None:
-        symmetric = found["error_symmetric_m"]
-        modulo = f" ({millimetres(symmetric)} modulo symmetry)" if symmetric < 0.9 * found["error_m"] else ""
-        said.append(f"error {millimetres(found['error_m'])}{modulo}")
-    if len(found["modes"]) > 1:
-        said.append(f"{len(found['modes'])} likely places")
-    said.append(f"90 % within {millimetres(found['credible90_m'])}")
-    said.append(f"{found['seconds']:.2f} s")
-    if baselines and result["geometry_baseline_m"] is not None:
-        said.append(
-            f"baselines: geometry alone {millimetres(result['geometry_baseline_m'])}, "
-            f"random {millimetres(result['random_baseline_m'])}"
-        )
-    mock = "mock bench, " if result["mock"] else ""
-    return mock + "; ".join(said)
-
-
-def millimetres(metres: float) -> str:
-    """For people."""
+def _mm(metres: float) -> str:
     return f"{metres * 1e3:.1f} mm"

@@ -11,7 +11,6 @@ from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import true_points
 from experiments.contact_localization.sound.evidence import StrikeEvidence, hear
-from experiments.contact_localization.sound.likelihood import ModeRow
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import FitRefused
 from harness.basics.materials import Material
@@ -46,9 +45,13 @@ def sound_of(scored: Scored) -> Sound | Missing:
     if heard is None:
         return Missing("no contact was struck")
     evidence = heard.term.evidence
+    reasons = dict(zip(heard.struck.tolist(), evidence.reasons, strict=True))
     return Sound(
         senses=_senses(scored),
-        strikes=_strikes(found, heard),
+        strikes=tuple(
+            strike_line(index + 1, observation.strike, reasons.get(index, NOT_STRUCK))
+            for index, observation in enumerate(found.observations)
+        ),
         pair=_pair(found, heard),
         peaks=_peaks(found, heard),
         set_aside=len(evidence.rejected),
@@ -70,29 +73,15 @@ def posterior_of(estimate: Estimate) -> Posterior:
 
 
 def _senses(scored: Scored) -> tuple[SenseAnswer, ...]:
-    points = true_points(scored)
-    true = None if points is None else points[-1]
-    return tuple(_sense(name, found, true) for name, found in scored.found.by_sense.items())
-
-
-def _sense(name: str, found: Estimate | FitRefused, true: FloatArray | None) -> SenseAnswer:
-    if isinstance(found, FitRefused):
-        return SenseAnswer(name, Missing(str(found)))
-    return SenseAnswer(
-        name=name,
-        posterior=posterior_of(found),
-        error=None if true is None else float(np.linalg.norm(found.position_in_object - true)),
-        area=found.region.area,
-        seconds=sum(found.seconds.values()),
-    )
-
-
-def _strikes(found: Answer, heard: StrikeEvidence) -> tuple[StrikeLine, ...]:
-    reasons = dict(zip(heard.struck.tolist(), heard.term.evidence.reasons, strict=True))
-    return tuple(
-        strike_line(index + 1, observation.strike, reasons.get(index, NOT_STRUCK))
-        for index, observation in enumerate(found.observations)
-    )
+    true, answers = true_points(scored), []
+    for name, found in scored.found.by_sense.items():
+        if isinstance(found, FitRefused):
+            answers.append(SenseAnswer(name, Missing(str(found))))
+            continue
+        error = None if true is None else float(np.linalg.norm(found.position_in_object - true[-1]))
+        seconds = sum(found.seconds.values())
+        answers.append(SenseAnswer(name, posterior_of(found), error, found.region.area, seconds))
+    return tuple(answers)
 
 
 def strike_line(contact: int, strike: Strike | None, unused: str) -> StrikeLine:
@@ -173,21 +162,20 @@ def _peaks(found: Answer, heard: StrikeEvidence) -> tuple[PeakLine, ...] | Missi
     if not evidence.peaks:
         return Missing("the strikes have no resonance in common")
     rows = heard.term.mode_table(found.last.contacts[heard.struck], _directions(found, heard.struck.tolist()))
-    return tuple(_peak(row, heard.term.weight) for row in rows)
-
-
-def _peak(row: ModeRow, weight: float) -> PeakLine:
-    return PeakLine(
-        frequency=row.frequency,
-        damping=row.damping,
-        residual=row.residual,
-        level=row.level,
-        modes=tuple(mode + 1 for mode in row.modes),
-        mode_frequency=row.model_frequency if row.modes else None,
-        mode_damping=row.model_damping if row.modes else None,
-        probability=row.probability,
-        nats=row.nats,
-        weight=weight,
+    return tuple(
+        PeakLine(
+            frequency=row.frequency,
+            damping=row.damping,
+            residual=row.residual,
+            level=row.level,
+            modes=tuple(mode + 1 for mode in row.modes),
+            mode_frequency=row.model_frequency if row.modes else None,
+            mode_damping=row.model_damping if row.modes else None,
+            probability=row.probability,
+            nats=row.nats,
+            weight=heard.term.weight,
+        )
+        for row in rows
     )
 
 

@@ -1,6 +1,6 @@
 """Which strikes speak for themselves, and whether places and sounds alone can be of this object."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from experiments.contact_localization.posterior.likelihood import arrange, geome
 from experiments.contact_localization.posterior.noise import SAME_AXIS, SAME_PLACE
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.sound.evidence import ANCHORS, StrikeEvidence, strike_places
-from harness.basics.arrays import FloatArray
+from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import FitRefused
 from harness.bench.acquisition import Strike
 from harness.recording.observation import Observation
@@ -22,9 +22,11 @@ Calibration runs on the right object: 36 of 131 lie beyond it by sound alone, mo
 modes are dense, and 11 of 88 by touch and sound; on another object that was not refused, 52 of 54 and 12
 of 13."""
 
+
 STRANGER = 0.5
 """Nats by which every resonance that no mode explains speaks against the object. Of a dense object's many
 resonances half may lie between the modes: a nat each refused two right objects of 131."""
+
 
 REFUSE_BELOW = -4.0
 """Nats of places and sound at the best hypothesis, the worst contact's place left out, and what no mode
@@ -32,13 +34,18 @@ explains counted against it. Calibration runs: on the right object, 131 runs, at
 53 of 195 with close steps and 1 of 198 with spread ones are above the limit, which sound alone therefore
 does not refuse: all but two of them are ``strange``."""
 
+
 REFUSE_UNHEARD_BELOW = -12.0
 """The same where next to nothing was heard."""
+
 
 _TELLING = 3
 """Resonances that can tell whose they are."""
 
+
 _FEWEST = 2
+
+
 _STRANGE = "by its sound this may be another object, or one of another wall or material"
 
 
@@ -98,47 +105,36 @@ def fit_by_sound(search: Search, hypotheses: Hypotheses, heard: StrikeEvidence, 
     )
 
 
-def refuse_strange_sound(
-    search: Search, hypotheses: Hypotheses, heard: StrikeEvidence, count: int
+def judge_sound(
+    search: Search, hypotheses: Hypotheses, heard: StrikeEvidence, count: int, alone: bool
 ) -> tuple[str, ...]:
-    """Raise where the places of the contacts and their sounds together cannot be of this object.
-
-    Returns:
-        What a reader must know of a sound that is not refused and yet may be another object's.
-
-    Raises:
-        FitRefused: naming the worst contact.
-    """
-    fit = fit_by_sound(search, hypotheses, heard, count)
-    if fit.total >= fit.limit:
-        return _doubts(fit)
-    worst = int(np.argmin(fit.places))
-    raise FitRefused(
-        f"what was struck does not fit this object: the best place explains it with {fit.total:.1f} nats "
-        f"(limit {fit.limit:g}), and {_of_resonances(fit)}; contact {worst + 1} is the worst, its place fits "
-        f"with {fit.places[worst]:.1f}. Check that it is this object, its units, its wall and its material"
-    )
-
-
-def doubts_of_sound_at(
-    search: Search, hypotheses: Hypotheses, heard: StrikeEvidence, count: int
-) -> tuple[str, ...]:
-    """What a reader must know of an answer whose sound may be another object's; empty otherwise.
+    """State what a reader must know of an answer whose sound may be another object's; empty otherwise.
 
     Where the images fit, sound does not refuse: it warns. What the images of another object's like
     curvature let pass is nearly always heard.
+
+    Args:
+        search: the run.
+        hypotheses: the posterior.
+        heard: the run's strikes.
+        count: contacts that count.
+        alone: whether no image counts, so that a sound that cannot be of this object is refused.
+
+    Raises:
+        FitRefused: places and sounds together cannot be of this object; naming the worst contact.
     """
-    return _doubts(fit_by_sound(search, hypotheses, heard, count))
-
-
-def _doubts(fit: SoundFit) -> tuple[str, ...]:
-    return (f"{_of_resonances(fit)}: {_STRANGE}",) if fit.strange else ()
-
-
-def _of_resonances(fit: SoundFit) -> str:
+    fit = fit_by_sound(search, hypotheses, heard, count)
+    resonances = f"no mode explains {fit.unexplained} of the {fit.resonances} resonances heard"
     if fit.resonances == 0:
-        return "nothing was heard that speaks for it"
-    return f"no mode explains {fit.unexplained} of the {fit.resonances} resonances heard"
+        resonances = "nothing was heard that speaks for it"
+    if not alone or fit.total >= fit.limit:
+        return (f"{resonances}: {_STRANGE}",) if fit.strange else ()
+    worst = int(np.argmin(fit.places))
+    raise FitRefused(
+        f"what was struck does not fit this object: the best place explains it with {fit.total:.1f} nats "
+        f"(limit {fit.limit:g}), and {resonances}; contact {worst + 1} is the worst, its place fits "
+        f"with {fit.places[worst]:.1f}. Check that it is this object, its units, its wall and its material"
+    )
 
 
 def distinct_strikes(
@@ -167,8 +163,10 @@ def doubts_of_sound(observations: Sequence[Observation]) -> tuple[str, ...]:
     evidence = analyse([strike for strike in distinct if strike is not None])
     reasons = iter(evidence.reasons)
     repeated = _repeated(poses, strikes)
+    missing = {k: f"struck where contact {earlier + 1} was" for k, earlier in repeated.items()}
     said = [
-        next(reasons) if strike is not None else _missing(repeated, k) for k, strike in enumerate(distinct)
+        next(reasons) if strike is not None else missing.get(k, "not struck")
+        for k, strike in enumerate(distinct)
     ]
     left_out = ", ".join(f"contact {k + 1} ({reason})" for k, reason in enumerate(said) if reason)
     why = f"; left out: {left_out}" if left_out else ""
@@ -182,11 +180,6 @@ def doubts_of_sound(observations: Sequence[Observation]) -> tuple[str, ...]:
     return (f"sound says nothing: {found}{why}; the answer by sound is by the places of the contacts alone",)
 
 
-def _missing(repeated: Mapping[int, int], contact: int) -> str:
-    earlier = repeated.get(contact)
-    return "not struck" if earlier is None else f"struck where contact {earlier + 1} was"
-
-
 def _repeated(base_from_gels: Sequence[FloatArray], strikes: Sequence[Strike | None]) -> dict[int, int]:
     """Contacts whose strike repeats that of an earlier contact, which can be used itself."""
     repeated: dict[int, int] = {}
@@ -194,7 +187,13 @@ def _repeated(base_from_gels: Sequence[FloatArray], strikes: Sequence[Strike | N
     for k, strike in enumerate(strikes):
         if strike is None or strike.fault:
             continue
-        earlier = [j for j in counting if _same(base_from_gels[j], base_from_gels[k])]
+        here = base_from_gels[k]
+        earlier = [
+            j
+            for j in counting
+            if float(np.linalg.norm(base_from_gels[j][:3, 3] - here[:3, 3])) < SAME_PLACE
+            and float(base_from_gels[j][:3, 2] @ here[:3, 2]) > float(np.cos(SAME_AXIS))
+        ]
         if earlier:
             repeated[k] = earlier[0]
         else:
@@ -202,31 +201,24 @@ def _repeated(base_from_gels: Sequence[FloatArray], strikes: Sequence[Strike | N
     return repeated
 
 
-def _same(one: FloatArray, other: FloatArray) -> bool:
-    near = float(np.linalg.norm(one[:3, 3] - other[:3, 3])) < SAME_PLACE
-    return near and float(one[:3, 2] @ other[:3, 2]) > float(np.cos(SAME_AXIS))
-
-
 def _places(search: Search, best: Hypotheses, count: int) -> FloatArray:
     """``(contacts,)`` nats of every contact's place and axis at one hypothesis, hung where it fits best."""
-    every = [_places_by(search, best, count, int(anchor)) for anchor in anchors(np.arange(count), ANCHORS)]
-    return max(every, key=lambda places: float(places.sum()))
-
-
-def _places_by(search: Search, best: Hypotheses, count: int, anchor: int) -> FloatArray:
-    rotations = search.prior.object_from_base(best.yaws)
+    surface, rotations = search.surface, search.prior.object_from_base(best.yaws)
     indentations = np.array([contact.indentation for contact in search.contacts[:count]])
     points = search.positions[:count] - indentations[:, None] * search.axes[:count]
-    sample = np.asarray(search.surface.tree.query(search.contact_places(anchor, best))[1], dtype=np.int64)
     zero = np.zeros(1, dtype=np.int64)
 
-    def score(members: list[int]) -> float:
+    def score(members: list[int], sample: IntArray) -> float:
         arrangement = arrange(rotations, points[members], search.axes[members], 0)
-        return float(
-            geometry_scores(
-                search.surface, arrangement, sample, zero, np.zeros(1), search.geometry, True, np.inf
-            )[0]
+        scores = geometry_scores(
+            surface, arrangement, sample, zero, np.zeros(1), search.geometry, True, np.inf
         )
+        return float(scores[0])
 
-    first = score([anchor])
-    return np.array([first if k == anchor else score([anchor, k]) - first for k in range(count)])
+    every = []
+    for anchor in map(int, anchors(np.arange(count), ANCHORS)):
+        sample = np.asarray(surface.tree.query(search.contact_places(anchor, best))[1], dtype=np.int64)
+        first = score([anchor], sample)
+        nats = [first if k == anchor else score([anchor, k], sample) - first for k in range(count)]
+        every.append(np.array(nats))
+    return max(every, key=lambda places: float(places.sum()))

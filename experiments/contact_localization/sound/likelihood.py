@@ -425,14 +425,10 @@ def likely_scales(peaks: FloatArray, modes: FloatArray, noise: SoundNoise) -> Sc
         density = near / (len(modes) * noise.frequency * np.sqrt(2.0 * np.pi))
         reach = float(np.log(modes.max() / modes.min())) + high - low
         score += np.log((1.0 - noise.clutter) * density + noise.clutter / reach).sum(axis=1)
-    prior = -0.5 * (grid / noise.scale) ** 2
-    return _even(grid, prior + noise.scale_weight * score, noise.scale_step)
-
-
-def _even(grid: FloatArray, score: FloatArray, step: float) -> Scales:
-    """Factors at even steps about the most probable, which comes first; what hardly weighs is left out."""
-    nats = score - score.max()
-    apart = max(1, round(step / (grid[1] - grid[0])))
+    total = -0.5 * (grid / noise.scale) ** 2 + noise.scale_weight * score
+    # At even steps about the most probable, which comes first; what hardly weighs is left out.
+    nats = total - total.max()
+    apart = max(1, round(noise.scale_step / (grid[1] - grid[0])))
     chosen = np.arange(int(np.argmax(nats)) % apart, len(grid), apart)
     chosen = chosen[nats[chosen] > _NEGLIGIBLE]
     chosen = chosen[np.argsort(-nats[chosen], kind="stable")]

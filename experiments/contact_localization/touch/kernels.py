@@ -42,7 +42,19 @@ def similarities_at(
     places: FloatArray,
     behind: float,
 ) -> FloatArray:
-    """Cosines; see ``touch.similarities``."""
+    """Cosines between what the gel read and what it would have read at each place.
+
+    Args:
+        origin: ``(2,)`` metres, of the view along the tool.
+        view_pitch: metres a pixel of it.
+        depth: ``(rows, columns)`` metres of it.
+        reading: of the gel.
+        places: ``(n, 3)`` metres in view coordinates, on the object's surface.
+        behind: metres; a place so far behind the first surface cannot be touched and scores 0.
+
+    Returns:
+        ``(n,)`` between 0 and 1.
+    """
     heights, skirt, edge = reading[0], reading[4], reading[5]
     rows, columns = heights.shape
     crop, scratch = np.empty(heights.shape), np.empty((2, rows, columns))
@@ -403,18 +415,3 @@ def leanings_at(leans: FloatArray, tilt_x: float, tilt_y: float, spin: float) ->
     for n in range(len(leans)):
         result[n] = leaning(leans[n], tilt_x, tilt_y, spin)
     return result
-
-
-def turns_between(base_from_gel: FloatArray, turns: FloatArray) -> FloatArray:
-    """How the gel stands against one that looks upon an object turned by so much less about base z.
-
-    Args:
-        base_from_gel: ``(3, 3)`` rotation.
-        turns: ``(n,)`` rad, small.
-
-    Returns:
-        ``(n, 3)`` to first order: the gel's slopes along x and y of its picture, and its turn in that plane.
-    """
-    # The object turned one way is the gel turned the other, about z as the gel has it.
-    x, y, z = -base_from_gel[2]
-    return np.outer(turns, np.array([y, -x, z]))

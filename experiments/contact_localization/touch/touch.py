@@ -14,7 +14,6 @@ from experiments.contact_localization.touch.kernels import (
     Sigmas,
     fill_scores,
     leanings_at,
-    similarities_at,
     terms_at,
 )
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
@@ -23,6 +22,7 @@ from harness.sim.gel.view import ToolView
 
 UPRIGHT: FloatArray = read_only(np.zeros(3))
 """Of a gel that stands as its view does."""
+
 
 LEVEL_SLOPE = 0.06
 """Mean slope of a pixel below which it may be the gel at rest."""
@@ -121,11 +121,12 @@ def touch_map(
     core = coarse > max(threshold, 0.4 * peak)
     touched = np.argwhere(core) if peak > threshold else np.empty((0, 2), dtype=np.int64)
     coarse_pitch = pitch * block
+    steepness = np.hypot(*np.gradient(cut, pitch))
     return TouchMap(
         read_only(np.ascontiguousarray(coarse)),
         coarse_pitch,
         read_only(touched),
-        read_only(_level(cut, pitch, block) & (coarse > 0.0)),
+        read_only((block_means(steepness, block) < LEVEL_SLOPE) & (coarse > 0.0)),
         read_only(_half_kernel(skirt / coarse_pitch)),
         read_only(_half_kernel(edge / coarse_pitch)),
     )
@@ -135,12 +136,6 @@ def _half_kernel(sigma: float) -> FloatArray:
     """A Gaussian of ``sigma`` pixels from its centre out, all of it summing to 1."""
     kernel = np.exp(-0.5 * (np.arange(int(np.ceil(2.5 * sigma)) + 1) / sigma) ** 2)
     return np.asarray(kernel / (kernel[0] + 2.0 * kernel[1:].sum()))
-
-
-def _level(heights: FloatArray, pitch: float, block: int) -> BoolArray:
-    down, right = np.gradient(heights, pitch)
-    steep = np.hypot(down, right)
-    return np.asarray(block_means(steep, block) < LEVEL_SLOPE)
 
 
 def view_scores(view: ToolView, touch: TouchMap, noise: TouchNoise, pixels: IntArray) -> None:
@@ -245,18 +240,3 @@ def best_fit(
         - 0.5 * np.where(np.isfinite(cost), cost, np.inf)
     )
     return float(fits.max(initial=-np.inf))
-
-
-def similarities(view: ToolView, touch: TouchMap, places: FloatArray, behind: float = 1.5e-3) -> FloatArray:
-    """Cosine between what the gel read and what it would have read at each place.
-
-    Args:
-        view: along the tool.
-        touch: what the gel read.
-        places: ``(n, 3)`` metres in view coordinates, on the object's surface.
-        behind: metres; a place so far behind the first surface cannot be touched and scores 0.
-
-    Returns:
-        ``(n,)`` between 0 and 1.
-    """
-    return similarities_at(view.origin, view.pitch, view.depth, touch.reading, places, behind)

@@ -1,5 +1,6 @@
 """The modes that sounds are compared with may come from the object's ObjectFile: nothing is solved then."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 
 from experiments.contact_localization.accuracy.benchmark_runs import preparations
 from experiments.contact_localization.accuracy.budget import BUDGETS
-from experiments.contact_localization.accuracy.dials import KNOBS, needs_objectfile, settings
+from experiments.contact_localization.accuracy.dials import KNOBS, settings
 from experiments.contact_localization.accuracy.solving import Models
 from experiments.contact_localization.build_model import model_of_run, model_of_scene
 from experiments.contact_localization.model import Model
@@ -25,6 +26,7 @@ from harness.cost.curve import Point, Sample
 from harness.effects import sound_effects
 from harness.effects.accuracy import Accuracy, Level
 from harness.effects.scene_object import known_object
+from harness.effects.touch_file_effects import SHAPES as TOUCH
 from harness.experiment import object_modes
 from harness.experiment.front import Front
 from harness.objectfile.audio.part import with_audio
@@ -116,11 +118,16 @@ def test_settings_with_networks_are_measured_beside_those_without(
     sound: bool, networks: tuple[Modality, ...]
 ) -> None:
     """The simulation is named where networks are the default, and so measured; nothing is measured twice."""
+
+    def takes_networks(setting: Mapping[str, Level]) -> bool:
+        dials = (sound_effects.SHAPES, TOUCH)
+        return any(setting.get(dial.name, dial.default) != dial.default for dial in dials)
+
     without, beside = settings(sound=sound), settings(sound=sound, networks=networks)
     simulated, added = beside[: len(without)], beside[len(without) :]
     assert [{**plain, **named} for plain, named in zip(without, simulated, strict=True)] == simulated
-    assert not any(needs_objectfile(setting) for setting in simulated)
-    assert all(needs_objectfile(setting) for setting in added)
+    assert not any(takes_networks(setting) for setting in simulated)
+    assert all(takes_networks(setting) for setting in added)
     levels = {setting.get("sound.shapes", "open") for setting in added} - {"open"}
     assert levels == ({"network", "table"} if sound and "audio" in networks else set())
     drawn = {setting.get("touch.shapes", "open") for setting in added} - {"open"}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.model import Prior
-from experiments.contact_localization.posterior.grid import drawn, of_pairs, refine, systematic
-from experiments.contact_localization.posterior.hypotheses import Hypotheses
+from experiments.contact_localization.posterior.grid import drawn, of_pairs, refine
+from experiments.contact_localization.posterior.hypotheses import Hypotheses, systematic
 from experiments.contact_localization.posterior.search import Search
 from harness.basics.arrays import FloatArray, IntArray
 

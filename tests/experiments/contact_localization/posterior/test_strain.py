@@ -16,7 +16,6 @@ from experiments.contact_localization.posterior.estimate import (
     Estimate,
     locate,
     strain_of,
-    times_stated,
 )
 from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses
 from experiments.contact_localization.posterior.noise import Noise
@@ -51,9 +50,11 @@ def test_a_slipped_contact_alone_is_no_strain(search: Search) -> None:
     assert strain_of(search, drawn(search, 1.0), slipped) < MOST
 
 
-def test_errors_are_taken_as_stated_until_the_fit_contradicts_them_and_never_for_too_large() -> None:
+def test_errors_are_taken_as_stated_until_the_fit_contradicts_them_and_never_for_too_large(
+    plain: Estimate,
+) -> None:
     strains = np.linspace(0.0, 5.0, 101)
-    times = np.array([times_stated(strain) for strain in strains])
+    times = np.array([replace(plain, strain=strain).times_stated for strain in strains])
     assert (times[strains <= STRAINED] == 1.0).all()
     assert (np.diff(times) >= 0.0).all()
     assert times.max() == MOST

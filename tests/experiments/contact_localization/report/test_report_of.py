@@ -2,8 +2,10 @@
 
 import pytest
 
-from experiments.contact_localization.report.report import _by
+from experiments.contact_localization.report.report import SweepPoint, _by_seconds
+from harness.effects.accuracy import Accuracy
 from harness.report.simulated import _said, flat
+from harness.report.values import Missing
 from tests.support.localization import dials
 
 
@@ -24,6 +26,11 @@ def test_a_value_is_said_in_four_digits_and_nothing_is_not_less_than_nothing(
 
 
 def test_a_run_without_sound_answers_by_touch_whatever_its_levels_say() -> None:
-    assert _by(dials(senses="both"), heard=False) == "touch"
-    assert _by(dials(senses="both"), heard=True) == "both"
-    assert _by(dials(senses="touch", method="particle"), heard=True) == "particle"
+    def by(*tried: Accuracy) -> list[str]:
+        curves = _by_seconds(tuple(SweepPoint("", accuracy, 1.0, 1.0) for accuracy in tried))
+        assert not isinstance(curves, Missing)
+        return [curve.by for curve in curves]
+
+    assert by(dials(senses="both")) == ["touch"]
+    heard = dials(senses="audio"), dials(senses="both"), dials(senses="touch", method="particle")
+    assert by(*heard) == ["audio", "both", "particle"]

@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from experiments.contact_localization.touch.kernels import leanings_at, put_lean, turns_between
+from experiments.contact_localization.posterior.search import turns_between
+from experiments.contact_localization.touch.kernels import leanings_at, put_lean
 from experiments.contact_localization.touch.touch import UPRIGHT, TouchNoise, best_fit, touch_map
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_about

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from experiments.contact_localization.touch.kernels import similarities_at
 from experiments.contact_localization.touch.touch import (
     TouchMap,
     TouchNoise,
     best_fit,
-    similarities,
     touch_map,
     touch_terms,
     view_scores,
@@ -232,11 +232,12 @@ def test_the_paper_s_cosine_is_highest_near_the_true_place_and_between_0_and_1(b
     press = PRESSES["on the peg"]
     view, touch = seen(block, press), read(block, press)
     places = every_place(view, press) - np.array([0.0, 0.0, press.depth])
-    found = similarities(view, touch, places)
+    found = similarities_at(view.origin, view.pitch, view.depth, touch.reading, places, 1.5e-3)
     assert found.min() >= 0.0
     assert found.max() <= 1.0 + 1e-12
     assert np.linalg.norm(places[np.argmax(found)][:2] - centre_in(view, press)[:2]) < 1e-3
-    true = similarities(view, touch, centre_in(view, press)[None] - np.array([0.0, 0.0, press.depth]))
+    centre = centre_in(view, press)[None] - np.array([0.0, 0.0, press.depth])
+    true = similarities_at(view.origin, view.pitch, view.depth, touch.reading, centre, 1.5e-3)
     assert true[0] > found.max() - 0.01
 
 

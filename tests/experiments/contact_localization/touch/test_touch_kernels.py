@@ -10,7 +10,6 @@ from experiments.contact_localization.touch import kernels as touch_kernels
 from experiments.contact_localization.touch.touch import (
     TouchMap,
     TouchNoise,
-    similarities,
     touch_map,
     touch_terms,
     view_scores,
@@ -255,7 +254,8 @@ def test_similarities_are_the_cosines_of_the_two_maps(view: ToolView, reading: T
         shape = hung(np.maximum(0.0, crop - crop.max() + reading.heights.max()), reading)
         both = np.linalg.norm(shape) * np.linalg.norm(reading.heights)
         expected.append(float((shape * reading.heights).sum() / both))
-    assert similarities(view, reading, where) == pytest.approx(expected, abs=1e-9)
+    found = touch_kernels.similarities_at(view.origin, view.pitch, view.depth, reading.reading, where, 1.5e-3)
+    assert found == pytest.approx(expected, abs=1e-9)
 
 
 def test_what_lies_behind_the_first_surface_or_beyond_the_picture_is_like_nothing(
@@ -265,7 +265,10 @@ def test_what_lies_behind_the_first_surface_or_beyond_the_picture_is_like_nothin
     middle = np.array([columns // 2, rows // 2])
     front = np.r_[view.origin + view.pitch * middle, view.depth[middle[1], middle[0]]]
     behind, beside = front + 3e-3 * np.eye(3)[2], front + np.eye(3)[0]
-    found = similarities(view, reading, np.array([front, behind, beside]))
+    places = np.array([front, behind, beside])
+    found = touch_kernels.similarities_at(
+        view.origin, view.pitch, view.depth, reading.reading, places, 1.5e-3
+    )
     assert found[0] > 0.0
     assert found[1] == found[2] == 0.0
 
