@@ -24,6 +24,9 @@ from harness.recording.run_folder import RunFiles
 from harness.sim.optics.tactile_calibration import TactileCalibration
 from harness.sim.solid.walls import walled
 
+if TYPE_CHECKING:
+    from harness.objectfile.touch.tool_depth import CodedDepth
+
 
 def model_of_run(run: RunFiles, accuracy: Accuracy | None = None) -> Model:
     """The object and the sensor as a recording carries them.
@@ -79,10 +82,6 @@ def model_of_scene(
         )
     material = MATERIALS[scene.object.material]
     return Model(mesh, sensor, calibration, modes, material, seen=seen, seen_rms=rms, errors=station.errors)
-
-
-if TYPE_CHECKING:
-    from harness.objectfile.touch.tool_depth import CodedDepth
 
 
 def object_touch(

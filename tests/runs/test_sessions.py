@@ -79,7 +79,7 @@ def test_a_complete_run_is_resumed_without_a_bench(
         return {"schema": 1, "warnings": [], "recording": str(recording.folder)}
 
     monkeypatch.setattr("harness.experiment.perform.open_station", open_nothing)
-    monkeypatch.setattr("harness.commands.run.answered_run.finish", finish)
+    monkeypatch.setattr("harness.commands.run.planned_run.finish", finish)
     folder = copied(done, tmp_path / "run").folder
     assert invoke(["run", "--resume", str(folder), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["recording"] == str(folder)
@@ -176,7 +176,7 @@ def test_a_run_that_its_bench_ends_says_how_it_goes_on(
     def fail(*_: object, **__: object) -> None:
         raise BenchFault("the arm is gone")
 
-    monkeypatch.setattr("harness.commands.run.answered_run.perform_on_bench", fail)
+    monkeypatch.setattr("harness.commands.run.planned_run.perform_on_bench", fail)
     folder = copied(done, tmp_path / "run").folder
     (folder / "steps" / "002.mcap").unlink()
     assert invoke(["run", "--resume", str(folder)]) == 1

@@ -1,18 +1,22 @@
 """``touchstone object build``: from a mesh to an ObjectFile."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeVar
 
 import typer
 from rich.table import Table
 
 from harness.commands import options
-from harness.commands.object.build_answer import build_and_say
-from harness.commands.output import ANSWERS
+from harness.commands.output import ANSWERS, emit, share_progress, warn
 
 if TYPE_CHECKING:
-    from harness.authoring.audio.object_audio import AudioRequest, BuiltAudio
+    from harness.authoring.audio.object_audio import BuiltAudio
+    from harness.authoring.touch.object_touch import BuiltTouch
+    from harness.authoring.vision.object_vision import BuiltVision
+    from harness.objectfile.vision_entry import VisionEntry
+
 
 _ROWS = {
     "network": "network",
@@ -103,31 +107,36 @@ def build(
     limit, longest = options.quantity("--up-to", up_to, FREQUENCY), options.quantity("--edge", edge, LENGTH)
     with hold_folder(out):
         if only == "touch":
-            from harness.commands.object.build_touch import build_touch_part
+            from harness.authoring.touch.object_touch import TouchRequest, build_touch
+            from harness.bench.sensor import DEFAULT_MAKE, described_sensor
 
-            return build_touch_part(wanted, sensor, out, threads or 1, json)
+            touch = TouchRequest(**vars(wanted), sensor=described_sensor(sensor or DEFAULT_MAKE).sensor)
+            return build_and_print(
+                lambda report: build_touch(touch, out, report, threads or 1), _touch_json, _print_touch, json
+            )
         if only == "vision":
-            from harness.commands.object.build_vision import build_vision_part
+            from harness.authoring.vision.object_vision import build_vision
 
-            return build_vision_part(wanted, out, threads, json, finish)
-        from harness.authoring.audio.object_audio import AudioRequest
+            return build_and_print(
+                lambda report: build_vision(wanted, out, report, threads, finish),
+                _vision_json,
+                _print_vision,
+                json,
+            )
+        from harness.authoring.audio.object_audio import AudioRequest, build_audio
+        from harness.basics.store import Store, default_folder
 
-        return _build_audio_part(
-            AudioRequest(**vars(wanted), limit=limit, most=modes, edge=longest), out, threads or 1, json
+        audio = AudioRequest(**vars(wanted), limit=limit, most=modes, edge=longest)
+        store = Store(default_folder())
+        return build_and_print(
+            lambda report: build_audio(audio, out, store, report, threads or 1),
+            _audio_json,
+            _print_audio,
+            json,
         )
 
 
-def _build_audio_part(wanted: "AudioRequest", out: Path, threads: int, json: bool) -> int:
-    from harness.authoring.audio.object_audio import build_audio
-    from harness.basics.store import Store, default_folder
-
-    store = Store(default_folder())
-    return build_and_say(
-        lambda report: build_audio(wanted, out, store, report, threads), _as_json, _print, json
-    )
-
-
-def _as_json(built: "BuiltAudio") -> dict[str, Any]:
+def _audio_json(built: "BuiltAudio") -> dict[str, Any]:
     from harness.sim.modal.stage_seconds import cpu, wall
 
     audio, modes = built.audio, built.modes
@@ -148,40 +157,157 @@ def _as_json(built: "BuiltAudio") -> dict[str, Any]:
     }
 
 
-def _print(built: "BuiltAudio") -> None:
+def _print_audio(built: "BuiltAudio") -> None:
+    from harness.sim.modal.stage_seconds import cpu, wall
+
     audio, modes = built.audio, built.modes
     drawn = Table(
         title=f"{built.object.folder}: {len(modes.frequencies)} modes, "
         f"{len(audio.split.held_out)} of {len(modes.points)} vertices held out"
     )
-    for heading in ("shapes from", "gain error", "95th", "STFT e-5", "envelope e-4", "spectrum dB", "MB"):
+    columns = {
+        "gain_error_median": ("gain error", "{:.2f} %", 1e2),
+        "gain_error_p95": ("95th", "{:.2f} %", 1e2),
+        "stft_distance": ("STFT e-5", "{:.3g}", 1e5),
+        "envelope_distance": ("envelope e-4", "{:.3g}", 1e4),
+        "spectral_error_db": ("spectrum dB", "{:.1f}", 1.0),
+        "bytes": ("MB", "{:.2f}", 1e-6),
+    }
+    for heading in ("shapes from", *(heading for heading, _, _ in columns.values())):
         drawn.add_column(heading, no_wrap=True)
     for name, errors in audio.errors.items():
-        drawn.add_row(_ROWS[name], *_cells(errors))
+        cells = (
+            form.format(errors[key] * scale) if key in errors else ""
+            for key, (_, form, scale) in columns.items()
+        )
+        drawn.add_row(_ROWS[name], *cells)
     ANSWERS.print(drawn)
-    _print_seconds(built.seconds)
-
-
-def _print_seconds(seconds: Mapping[str, float]) -> None:
-    from harness.sim.modal.stage_seconds import cpu, wall
-
-    stages = {**wall(seconds), "together": sum(wall(seconds).values())}
-    worked = {**cpu(seconds), "together": sum(cpu(seconds).values())}
+    stages = {**wall(built.seconds), "together": sum(wall(built.seconds).values())}
+    worked = {**cpu(built.seconds), "together": sum(cpu(built.seconds).values())}
     drawn = Table(*stages, title="seconds, and below them those of the processor")
     for row in (stages, worked):
         drawn.add_row(*(f"{row[stage]:.1f}" for stage in stages))
     ANSWERS.print(drawn)
 
 
-def _cells(errors: Mapping[str, float]) -> list[str]:
-    scales = {
-        "gain_error_median": ("{:.2f} %", 1e2),
-        "gain_error_p95": ("{:.2f} %", 1e2),
-        "stft_distance": ("{:.3g}", 1e5),
-        "envelope_distance": ("{:.3g}", 1e4),
-        "spectral_error_db": ("{:.1f}", 1.0),
-        "bytes": ("{:.2f}", 1e-6),
+class Built(Protocol):
+    """What a builder gives back."""
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """What was done to the mesh and what to look at, a sentence each."""
+
+
+Part = TypeVar("Part", bound=Built)
+
+
+def build_and_print(
+    builder: Callable[[Callable[[str, float], None]], Part],
+    as_json: Callable[[Part], Mapping[str, Any]],
+    show: Callable[[Part], None],
+    json: bool,
+) -> int:
+    """Build under a bar of progress, say what to look at, and answer.
+
+    Args:
+        builder: of the part; handed what it is to tell of its progress.
+        as_json: the answer for scripts.
+        show: the answer for people.
+        json: whether the answer is for scripts.
+    """
+    with share_progress(quiet=json) as report:
+        built = builder(report)
+    for sentence in built.said:
+        warn(sentence)
+    if json:
+        emit(as_json(built))
+    else:
+        show(built)
+    return 0
+
+
+_KINDS = {"trained_places": "trained places", "unseen_places": "unseen places", "any_press": "any press"}
+
+
+_TOUCH_ROWS = {"level": "codes", "nearest_trained": "nearest trained place", "background": "untouched gel"}
+
+
+def _touch_json(built: "BuiltTouch") -> dict[str, Any]:
+    touch = built.touch
+    errors = {kind: {name: dict(row) for name, row in rows.items()} for kind, rows in touch.errors.items()}
+    return {
+        "schema": 1,
+        "folder": str(built.object.folder),
+        "nodes": len(touch.codes.nodes),
+        "settings": dict(touch.settings),
+        "errors": errors,
+        "measured": dict(touch.codes.measured),
+        "bytes": sum(entry.bytes for entry in _touch_entry(built).files),
+        "seconds": dict(built.seconds),
     }
-    return [
-        form.format(errors[name] * scale) if name in errors else "" for name, (form, scale) in scales.items()
-    ]
+
+
+def _touch_entry(built: "BuiltTouch") -> Any:
+    entry = built.object.description.touch
+    assert entry is not None
+    return entry
+
+
+def _print_touch(built: "BuiltTouch") -> None:
+    touch = built.touch
+    size = sum(entry.bytes for entry in _touch_entry(built).files) / 1e6
+    drawn = Table(title=f"{built.object.folder}: {len(touch.codes.nodes)} coded places, {size:.1f} MB")
+    for heading in ("presses at", "maps from", "PSNR dB, median", "10th percentile", "possible of asked"):
+        drawn.add_column(heading, no_wrap=True)
+    for kind, rows in touch.errors.items():
+        counts = rows["presses"]
+        for name, said in _TOUCH_ROWS.items():
+            row = rows[name]
+            cells = f"{row['psnr_db_median']:.1f}", f"{row['psnr_db_p10']:.1f}"
+            drawn.add_row(_KINDS[kind], said, *cells, f"{counts['possible']:.0f} of {counts['asked']:.0f}")
+    ANSWERS.print(drawn)
+    said = ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in built.seconds.items())
+    ANSWERS.print(said, markup=False)
+
+
+def _vision_json(built: "BuiltVision") -> dict[str, Any]:
+    """As scripts read it; an error without a number, as the decibels of equal pictures, is null."""
+    entry = _vision_entry(built)
+    return {
+        "schema": 1,
+        "folder": str(built.object.folder),
+        "level": entry.level,
+        "networks": entry.grid.networks,
+        "cell_m": entry.grid.cell_m,
+        "width": entry.size.width,
+        "settings": dict(built.vision.settings),
+        "errors": {
+            name: value if math.isfinite(value) else None for name, value in built.vision.errors.items()
+        },
+        "bytes": sum(file.bytes for file in entry.files),
+        "seconds": dict(built.seconds),
+        "seconds_in_all": sum(built.seconds.values()),
+    }
+
+
+def _print_vision(built: "BuiltVision") -> None:
+    """For people: a table of what was measured on pictures never trained on, and of seconds."""
+    entry = _vision_entry(built)
+    size = sum(file.bytes for file in entry.files) / 1e6
+    networks = f"{entry.grid.networks} networks {entry.size.width} wide, {entry.level}"
+    drawn = Table(title=f"{built.object.folder}: {networks}, {size:.1f} MB")
+    drawn.add_column("on pictures never trained on", no_wrap=True)
+    drawn.add_column("measured", justify="right", no_wrap=True)
+    for name, value in built.vision.errors.items():
+        drawn.add_row(name.replace("_", " "), f"{value:.4g}")
+    drawn.add_section()
+    for stage, seconds in built.seconds.items():
+        drawn.add_row(f"seconds: {stage}", f"{seconds:.1f}")
+    drawn.add_row("seconds in all", f"{sum(built.seconds.values()):.1f}")
+    ANSWERS.print(drawn)
+
+
+def _vision_entry(built: "BuiltVision") -> "VisionEntry":
+    entry = built.object.description.vision
+    assert entry is not None
+    return entry

@@ -1,5 +1,6 @@
 """``touchstone depth``: how deep a gel is pressed, from live pictures, with the error of every pixel."""
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,15 +9,15 @@ import typer
 from harness.commands import force_options as forces
 from harness.commands import options
 from harness.commands.output import ANSWERS, emit, warn
-from harness.commands.press import depth_force
 
 if TYPE_CHECKING:
     from harness.basics.arrays import ByteArray, FloatArray
     from harness.bench.sensor import TactileSensor
     from harness.bench.station_file import Station
+    from harness.sim.gel.elastic import GelElastic
     from harness.sim.optics.depth_reading import DepthReading
-    from harness.sim.optics.inverse import Detection
     from harness.sim.optics.tactile_calibration import TactileCalibration
+
 
 FRAME_WORDS = {"gel": "of the gel", "flange": "of the arm's flange"}
 
@@ -96,28 +97,44 @@ def depth(
     Try: touchstone depth press.png --background rest.png --calibration gelsight_r15_bench --picture d.png
     """
     from harness.basics.files.named_file import refusals_name
+    from harness.basics.npz_file import write_array, write_arrays
+    from harness.bench.sensor import described_sensor
     from harness.bench.station_file import load_station, station_path
     from harness.picture.image_file import read_image
     from harness.sim.optics.depth_reading import read_press
+    from harness.sim.optics.inverse import DRIFTING, STEADY
 
     options.require_files(
         ("--out", out, ".npz"), ("--picture", picture, ".png"), ("--height-out", height_out, ".npy")
     )
     bench = None if station is None else load_station(station_path(station))
-    gel = _sensor(sensor, bench)
+    if sensor is not None:
+        gel: TactileSensor | None = described_sensor(sensor).sensor
+    else:
+        gel = None if bench is None else bench.gel.sensor
     known = _calibration(calibration, bench)
     gel = gel or _sensor_named_by(known)
-    wanted = depth_force.asked(force, thickness, gel_modulus, gel_modulus_error, gel_poisson, gel)
+    wanted = _wanted_force(force, thickness, gel_modulus, gel_modulus_error, gel_poisson, gel)
     rest = None if background is None else read_image(background)
+    # A background of just now is by the light of now; the calibration's is of another day.
+    detection = DRIFTING if rest is None else STEADY
     frames, thickness_known = _frames(images), None if gel is None else gel.gel_thickness
     with refusals_name(*images, *([] if background is None else [background])):
-        found = read_press(frames, known, _detection(rest), rest, thickness_known)
+        found = read_press(frames, known, detection, rest, thickness_known)
     frame_from_gel = None if bench is None else bench.flange_from_gel
     points = found.points(frame_from_gel)
-    pressed = depth_force.answer_force(wanted, found)
-    _write(found, points, out, height_out)
+    pressed = _force_json(wanted, found)
+    if out is not None:
+        arrays = {"height": found.height, "sigma": found.sigma, "contact": found.contact}
+        arrays |= {"trusted": found.trusted, "points": points, "points_sigma": found.sigma[found.contact]}
+        write_arrays(out, arrays, compressed=True)
+    if height_out is not None:
+        write_array(height_out, found.height)
     if picture is not None:
-        _draw(found, picture)
+        from harness.report.figures.depth import depth_figure
+        from harness.report.figures.figures import Album
+
+        Album(picture.parent).photograph(picture.stem, depth_figure(found))
     answer = _answer(found, known, points, "gel" if bench is None else "flange")
     answer["sensor"] = None if gel is None else {"name": gel.name, "gel_thickness_m": gel.gel_thickness}
     if gel is None:
@@ -158,15 +175,6 @@ def _calibration(named: str | None, bench: "Station | None") -> "TactileCalibrat
     return named_calibration(named)
 
 
-def _sensor(named: str | None, bench: "Station | None") -> "TactileSensor | None":
-    """Return the sensor of ``--sensor``, else of the station; None where neither is given."""
-    from harness.bench.sensor import described_sensor
-
-    if named is not None:
-        return described_sensor(named).sensor
-    return None if bench is None else bench.gel.sensor
-
-
 def _sensor_named_by(known: "TactileCalibration") -> "TactileSensor | None":
     """Return the shipped sensor that a calibration names as its own; None where there is none.
 
@@ -192,37 +200,6 @@ def _frames(images: list[Path]) -> "ByteArray":
                 f"{read[0].shape[0]}; give frames of one press by one camera"
             )
     return np.stack(read)
-
-
-def _detection(rest: "ByteArray | None") -> "Detection":
-    """A background of just now is by the light of now; the calibration's is of another day."""
-    from harness.sim.optics.inverse import DRIFTING, STEADY
-
-    return DRIFTING if rest is None else STEADY
-
-
-def _write(found: "DepthReading", points: "FloatArray", out: Path | None, height_out: Path | None) -> None:
-    from harness.basics.npz_file import write_array, write_arrays
-
-    arrays = {
-        "height": found.height,
-        "sigma": found.sigma,
-        "contact": found.contact,
-        "trusted": found.trusted,
-        "points": points,
-        "points_sigma": found.sigma[found.contact],
-    }
-    if out is not None:
-        write_arrays(out, arrays, compressed=True)
-    if height_out is not None:
-        write_array(height_out, found.height)
-
-
-def _draw(found: "DepthReading", picture: Path) -> None:
-    from harness.report.figures.depth import depth_figure
-    from harness.report.figures.figures import Album
-
-    Album(picture.parent).photograph(picture.stem, depth_figure(found))
 
 
 def _answer(
@@ -299,8 +276,8 @@ def _say(answer: dict[str, Any]) -> None:
         )
     else:
         ANSWERS.print("no contact")
-    for row in depth_force.say_force(answer):
-        ANSWERS.print(row)
+    if answer["force_n"] is not None:
+        ANSWERS.print(forces.sentence(answer["force_n"], answer["force_uncertainty_n"]))
     moved = ", ".join(f"{level:+.1f}" for level in answer["light_moved_levels"])
     ANSWERS.print(f"the light moved by {moved} grey levels (red, green, blue)")
     seconds = answer["seconds"]
@@ -311,3 +288,53 @@ def _say(answer: dict[str, Any]) -> None:
     for name in ("out", "height_out", "picture"):
         if answer[name] is not None:
             ANSWERS.print(answer[name], markup=False)
+
+
+def _wanted_force(
+    force: bool,
+    thickness: str | None,
+    modulus: str | None,
+    share: str | None,
+    poisson: float | None,
+    sensor: "TactileSensor | None",
+) -> "tuple[float, GelElastic] | None":
+    """Return the gel's thickness in metres and its stiffness; None where no force is asked for.
+
+    Raises:
+        WrongUse: options of a force without ``--force``, or a gel of which nobody says how thick it is.
+    """
+    from harness.basics.errors import WrongUse
+    from harness.basics.quantities import LENGTH
+
+    forces.require_force(force, [], modulus, share, **{"--thickness": thickness, "--gel-poisson": poisson})
+    if not force:
+        return None
+    found = options.positive("--thickness", thickness, LENGTH)
+    if found is None:
+        if sensor is None:
+            raise WrongUse(
+                "a force needs to know how thick the gel is: --thickness 2.5mm, a --sensor or a --station"
+            )
+        found = sensor.gel_thickness
+    return found, forces.stiffness(modulus, share, poisson)
+
+
+def _force_json(wanted: "tuple[float, GelElastic] | None", read: "DepthReading") -> dict[str, Any]:
+    """Return the keys of the answer, as ``sim touch`` has them, and its ``notes`` and ``seconds``."""
+    if wanted is None:
+        return {"force_n": None, "force_uncertainty_n": None, "force": None, "notes": [], "seconds": None}
+    from harness.effects.reading_force import read_force
+
+    began, (thickness, elastic) = time.process_time(), wanted
+    found = read_force(read, thickness, elastic)
+    took = time.process_time() - began
+    bound = bool(found.pressed.lower_bound[0]) or not read.anchored
+    said = forces.described(found.pressed, "layer", elastic, bound)
+    said["uncertainty_shares"]["reading"] = found.reading
+    return {
+        "force_n": found.newtons,
+        "force_uncertainty_n": found.uncertainty,
+        "force": {**said, "thickness_m": thickness},
+        "notes": forces.noted(found.pressed, elastic, bound),
+        "seconds": took,
+    }

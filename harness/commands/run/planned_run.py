@@ -1,7 +1,8 @@
 """A run before it moves: planned anew, or gone on with."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,21 +10,24 @@ from harness.basics.errors import WrongUse
 from harness.basics.quantities import LENGTH, TIME
 from harness.bench.station_file import load_station, station_path
 from harness.commands.options import positive
-from harness.commands.output import CONSOLE
+from harness.commands.output import ANSWERS, CONSOLE, emit, resumable, step_progress, stopped, warn
 from harness.commands.scenes import SceneOptions, resolve
 from harness.effects.accuracy import Accuracy
 from harness.effects.explain import as_table, left_out, scene_plan
 from harness.effects.explain_networks import networks_as_table, networks_in_use
 from harness.effects.file_levels import scene_levels
+from harness.experiment.answer import Publish, WrittenAnswer, add_report, finish, write_answer
 from harness.experiment.begin import Begun, begin
+from harness.experiment.budget import answer_as_asked, sentences
 from harness.experiment.experiment import Experiment
-from harness.experiment.front import foresee
+from harness.experiment.front import doubts, foresee, front_for
 from harness.experiment.levels import chosen_levels
 from harness.experiment.lookup import experiment_of, named, require_of
-from harness.experiment.perform import steps_planned
+from harness.experiment.perform import Performed, describe_bench, perform_on_bench, steps_planned
 from harness.experiment.solving import Target, target_of
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
+from harness.report.run_page import write_run_page
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +85,12 @@ def new_run(
     if target is not None:
         CONSOLE.print(foresee(experiment, wanted, target), markup=False)
     elif experiment.section is not None and experiment.error_key is not None:
-        _describe_end(experiment, vars(wanted.section(experiment.section))[experiment.error_key])
+        error = vars(wanted.section(experiment.section))[experiment.error_key]
+        if error is not None:  # such an experiment has no curve
+            CONSOLE.print(
+                f"no curve promises an error of {experiment.name} in advance: the run ends when its own "
+                f"estimate states {1e3 * error:g} mm or less, at the latest after its last {experiment.step}"
+            )
     begun = begin(experiment, wanted, station, bench.seed, bench.gap, bench.out, bench.bench, target)
     _describe(experiment, begun, accuracy)
     return PlannedRun(experiment, begun.recording, accuracy, target)
@@ -109,7 +118,14 @@ def resumed_run(
         WrongUse: the run is of another experiment, a level is unknown, or an option would plan it otherwise.
         RecordingDamaged: the folder holds no run that reads.
     """
-    _require_unchanged(bench, scene)
+    given = {**vars(bench), **vars(scene), **scene.keys}
+    given.update(range=given.pop("sizes"), set=given.pop("assignments") or None, keys=None)
+    options = [f"--{name}" for name, value in given.items() if value is not None]
+    if options:
+        raise WrongUse(
+            f"--resume goes on with the run as it was planned; {', '.join(options)} cannot change it now: "
+            "leave them out, or start another run"
+        )
     recording = Recording(folder)
     kind = experiment_of(recording)
     if experiment is not None:
@@ -121,18 +137,6 @@ def resumed_run(
     if target is None and not levels:
         target = target_of(recording.header.plan)
     return PlannedRun(kind, recording, accuracy, target)
-
-
-def _require_unchanged(bench: BenchOptions, scene: SceneOptions) -> None:
-    """Refuse options that would plan a run otherwise, and name them."""
-    given = {**vars(bench), **vars(scene), **scene.keys}
-    given.update(range=given.pop("sizes"), set=given.pop("assignments") or None, keys=None)
-    options = [f"--{name}" for name, value in given.items() if value is not None]
-    if options:
-        raise WrongUse(
-            f"--resume goes on with the run as it was planned; {', '.join(options)} cannot change it now: "
-            "leave them out, or start another run"
-        )
 
 
 def target_of_options(budget: str | None, error: str | None, levels: Sequence[str]) -> Target | None:
@@ -153,29 +157,25 @@ def target_of_options(budget: str | None, error: str | None, levels: Sequence[st
     return Target(seconds=value) if budget is not None else Target(error=value)
 
 
-def _describe_end(experiment: Experiment, error: float | None) -> None:
-    """State when a run ends whose own estimate is compared with ``--error``; it has no curve."""
-    if error is not None:
-        CONSOLE.print(
-            f"no curve promises an error of {experiment.name} in advance: the run ends when its own estimate "
-            f"states {1e3 * error:g} mm or less, at the latest after its last {experiment.step}"
-        )
-
-
 def _describe(experiment: Experiment, begun: Begun, accuracy: Accuracy) -> None:
     """What is about to happen, before anything moves; what is simulated, at the levels that were turned."""
     run = RunFiles(begun.recording)
     for line in begun.known.read:
         CONSOLE.print(line, markup=False)
-    section = None if experiment.section is None else run.scene.section(experiment.section)
+    section = {} if experiment.section is None else vars(run.scene.section(experiment.section))
+    spaced = f", {section['spacing']}" if section.get("spacing") is not None else ""
+    later, waiting = begun.plan.on_the_way, ""
+    if later:
+        what = f"{later} {experiment.plural} are" if later > 1 else f"1 {experiment.step} is"
+        waiting = f"; {what} planned, and rehearsed, once those before are read"
     CONSOLE.print(
         f"{run.scene.object.name}: {len(run.mesh.faces)} faces, "
         f"longest side {1e3 * (run.mesh.bounds[1] - run.mesh.bounds[0]).max():.0f} mm; "
-        f"{len(begun.plan.steps)} {experiment.plural}{_spaced(section)}; station {run.station.title}"
+        f"{len(begun.plan.steps)} {experiment.plural}{spaced}; station {run.station.title}"
     )
     CONSOLE.print(
         f"rehearsed in the twin: {begun.plan.rehearsal.segments} motions, none refused; "
-        f"{len(begun.plan.rehearsal.warnings)} warnings" + _on_the_way(begun.plan.on_the_way, experiment)
+        f"{len(begun.plan.rehearsal.warnings)} warnings{waiting}"
     )
     effects = scene_plan(run.scene, run.station.gel.sensor, accuracy)
     CONSOLE.print(as_table(effects, left_out=False))
@@ -187,14 +187,100 @@ def _describe(experiment: Experiment, begun: Begun, accuracy: Accuracy) -> None:
         CONSOLE.print(f"  {sentence}", markup=False)
 
 
-def _on_the_way(count: int, experiment: Experiment) -> str:
-    """What is said of steps that are not planned yet."""
-    if count == 0:
-        return ""
-    what = f"{count} {experiment.plural} are" if count > 1 else f"1 {experiment.step} is"
-    return f"; {what} planned, and rehearsed, once those before are read"
+def perform_and_answer(run: PlannedRun, as_json: bool) -> int:
+    """Perform what is left of a run and answer it; the exit code.
+
+    Without a target the answer is printed while the bench is still open: closing one takes its time. A run
+    that was performed before, or whose target chooses the levels, is answered once the bench is closed.
+
+    Raises:
+        TouchstoneError: of the bench, or of the answer; what was recorded is kept.
+    """
+    experiment, recording, written = run.experiment, run.recording, list[WrittenAnswer]()
+    draw, publish = partial(write_run_page, experiment), publisher(experiment, as_json)
+
+    def conclude(done: Performed) -> None:
+        if run.target is None:
+            rest = recording.folder, done.answering, publish
+            written.append(write_answer(experiment, recording, run.accuracy, *rest, since=done.ended))
+
+    with recording.hold():
+        done = _performed(run, as_json, conclude)
+        if not done.complete:
+            step = f"{experiment.step} {recording.committed}"
+            return stopped(step, recording.folder, _resuming(run), as_json)
+        health = done.health or None
+        if written:
+            result = add_report(experiment, written[0], draw, health, recording.folder)
+        else:
+            cost = {} if run.target is None else {"cost": _cost_of_target(run)}
+            accuracy = run.accuracy.with_(cost["cost"]["levels"]) if cost else run.accuracy
+            rest = accuracy, draw, health
+            result = finish(
+                experiment,
+                recording,
+                *rest,
+                answering=done.answering,
+                publish=publish,
+                more=cost,
+                since=done.ended,
+            )
+        show_report(result, as_json)
+        return 0
 
 
-def _spaced(section: Any) -> str:
-    spacing = None if section is None else vars(section).get("spacing")
-    return "" if spacing is None else f", {spacing}"
+def _cost_of_target(run: PlannedRun) -> dict[str, Any]:
+    """The levels that keep the target, and what they cost; doubts and cost are printed."""
+    assert run.target is not None
+    front = front_for(run.experiment, RunFiles(run.recording).scene, run.recording.committed)
+    for doubt in doubts(run.experiment, front, run.target):
+        warn(doubt)
+    with CONSOLE.status("estimating as asked, then at the finest levels"):
+        cost = answer_as_asked(run.experiment, run.recording, front, run.target)
+    for sentence in sentences(run.experiment, cost):
+        CONSOLE.print(sentence, markup=False)
+    return cost
+
+
+def _performed(run: PlannedRun, as_json: bool, conclude: Callable[[Performed], None]) -> Performed:
+    """What is left of the run; where no target chooses the levels, readings are taken in on the way."""
+    total = steps_planned(run.experiment, run.recording)
+    if run.recording.committed == total:
+        return Performed(True, {})  # nothing is left to touch: no bench is opened
+    CONSOLE.print(f"bench: {describe_bench(run.recording)}", markup=False)
+    CONSOLE.print(f"recording to {run.recording.folder}", markup=False)
+    accuracy: Accuracy | None = run.accuracy if run.target is None else None
+    with (
+        resumable(_resuming(run)),
+        step_progress(run.recording.committed, total, run.experiment.step) as progress,
+    ):
+        ask = None if as_json else partial(CONSOLE.print, markup=False, style="bold")
+        given = run.experiment, run.recording, progress, ask, accuracy
+        return perform_on_bench(*given, say=progress.say, conclude=conclude)
+
+
+def _resuming(run: PlannedRun) -> str:
+    """The command that goes on with a run."""
+    return f"touchstone run {run.experiment.name} --resume {run.recording.folder}"
+
+
+def publisher(experiment: Experiment, as_json: bool) -> Publish:
+    """Prints the answer as soon as it is known, before the report is drawn."""
+
+    def publish(result: Mapping[str, Any]) -> None:
+        for warning in result["warnings"]:
+            warn(warning)
+        if not as_json:
+            for line in experiment.lines(result):
+                ANSWERS.print(line, markup=False)
+            CONSOLE.print("comparing with the simulation, drawing the report", markup=False)
+
+    return publish
+
+
+def show_report(result: dict[str, Any], as_json: bool) -> None:
+    """Where the report is; the one object of ``--json``."""
+    if as_json:
+        emit(result)
+    else:
+        ANSWERS.print(f"report: {result['report']}", markup=False)

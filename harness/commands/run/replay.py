@@ -1,5 +1,6 @@
 """``touchstone replay``: estimate again from a recording alone."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -33,13 +34,14 @@ def replay(
     options.require_folders(("--out", out), ("--wav", wav))
     from harness.basics.errors import RecordingDamaged
     from harness.basics.files.lock_file import hold_folder
-    from harness.commands.run.answered_run import drawing, publisher, show_report
+    from harness.commands.run.planned_run import publisher, show_report
     from harness.experiment.answer import finish, levels_of_result
     from harness.experiment.levels import chosen_levels
     from harness.experiment.lookup import experiment_of
     from harness.recording.recording import Recording
     from harness.recording.run_folder import RunFiles
     from harness.recording.wav_export import export_wav
+    from harness.report.run_page import write_run_page
 
     recording = Recording(run)
     kind = experiment_of(recording)
@@ -53,7 +55,8 @@ def replay(
         warn(f"{error}; the default levels are taken")
     accuracy = chosen_levels(kind.knobs, level or [], own)
     folder = out or run.with_name(f"{run.name}-replay")
+    draw = partial(write_run_page, kind)
     with hold_folder(folder):
-        result = finish(kind, recording, accuracy, drawing(kind), None, folder, None, publisher(kind, json))
+        result = finish(kind, recording, accuracy, draw, None, folder, None, publisher(kind, json))
     show_report(result, json)
     return 0

@@ -102,8 +102,13 @@ def run(
     Try: touchstone run contact-localization --station mock --scene scenes/mug_touch.toml
     """
     options.require_folders(("--out", out))
-    from harness.commands.run.answered_run import perform_and_answer
-    from harness.commands.run.planned_run import BenchOptions, new_run, resumed_run, target_of_options
+    from harness.commands.run.planned_run import (
+        BenchOptions,
+        new_run,
+        perform_and_answer,
+        resumed_run,
+        target_of_options,
+    )
     from harness.commands.scenes import SceneOptions
     from harness.experiment.lookup import named
 

@@ -8,10 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.basics.errors import WrongUse
-from harness.cost.bounds import KEPT, most_seconds
+from harness.cost.bounds import KEPT, lines, most_seconds
 from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import from_json, to_json
-from harness.cost.work import lines
 
 OBJECTS = {"mug": 0.02, "tray": 0.05, "pitcher": 0.03}
 """s that one place takes, by object."""

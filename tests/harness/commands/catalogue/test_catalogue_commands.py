@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from harness.cli import invoke
-from harness.commands.catalogue.build_progress import Throughput
+from harness.commands.catalogue.build import Throughput
 from tests.samples.tiny_catalogue import block
 
 

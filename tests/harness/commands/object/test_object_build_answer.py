@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from harness.commands.object.build_answer import build_and_say
+from harness.commands.object.build import build_and_print
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ def shown(thing: Thing) -> None:
 def test_notes_go_beside_the_answer_and_the_answer_is_one(
     script: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert build_and_say(of_steel, lambda thing: {"said": list(thing.said)}, shown, script) == 0
+    assert build_and_print(of_steel, lambda thing: {"said": list(thing.said)}, shown, script) == 0
     out, err = capsys.readouterr()
     assert err.index("holes were closed") < err.index("its [wall] is thin")
     if script:
@@ -39,5 +39,5 @@ def test_notes_go_beside_the_answer_and_the_answer_is_one(
 
 def test_progress_is_shown_to_people_and_not_to_scripts(capsys: pytest.CaptureFixture[str]) -> None:
     for script in (False, True):
-        build_and_say(of_steel, lambda _: {}, shown, script)
+        build_and_print(of_steel, lambda _: {}, shown, script)
         assert ("casting: 50 %" in capsys.readouterr().err) is not script
