@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from harness.basics.errors import DataRefused, TouchstoneError
-from harness.basics.store import default_folder
+from harness.basics.store import default_folder, digest
 from harness.basics.whole_file import write_text_whole
 from harness.cost.curve import Curve, Point, Sample
-from harness.cost.provenance import machine, machine_key
+from harness.cost.provenance import machine
 
 SCHEMA = 3
 
@@ -20,7 +20,7 @@ _DIGITS = 5
 
 def curve_path(program: str, description: Mapping[str, str] | None = None) -> Path:
     """Where the curve of a program on a machine is kept; on this one where none is described."""
-    key = machine_key(machine() if description is None else description)
+    key = digest(dict(machine() if description is None else description))[:12]
     return default_folder() / "cost" / f"{program}-{key}.json"
 
 
@@ -139,12 +139,11 @@ def _point_json(point: Point, numbers: Mapping[tuple[str, str], int]) -> dict[st
         "levels": dict(point.levels),
         "condition": dict(point.condition),
         "runs": [numbers[sample.run, sample.object] for sample in point.samples],
-        **{key: [_rounded(sample[name]) for sample in samples] for name, key in _COLUMNS.items()},
+        **{
+            key: [None if one[name] is None else float(f"{one[name]:.{_DIGITS}g}") for one in samples]
+            for name, key in _COLUMNS.items()
+        },
     }
-
-
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else float(f"{value:.{_DIGITS}g}")
 
 
 def _point(tree: Mapping[str, Any], runs: Sequence[Mapping[str, Any]]) -> Point:

@@ -8,11 +8,12 @@ from pathlib import Path
 
 from harness.basics.code_version import content_hash
 from harness.basics.cores import own_cores
-from harness.basics.store import digest
 from harness.cost.curve import Curve
 from harness.recording.run_folder import git_commit
 
 _VERSIONS = ("numpy", "scipy", "numba")
+
+
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -54,11 +55,6 @@ def stale(curve: Curve, here: Mapping[str, str], now: Mapping[str, str]) -> tupl
     if curve.code.get("sha256") != now.get("sha256"):
         reasons.append(f"the estimate's code has changed since {curve.code.get('git', 'an unknown commit')}")
     return tuple(reasons)
-
-
-def machine_key(description: Mapping[str, str]) -> str:
-    """A short name of a machine, for files."""
-    return digest(dict(description))[:12]
 
 
 def _cpu_model() -> str:

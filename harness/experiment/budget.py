@@ -66,7 +66,8 @@ def answer_as_asked(
     budgets = budgets_of(experiment)
     run = budgets.solver(RunFiles(recording))
     front = front.fitting(run.unfit)
-    run.load([point.levels for point in sorted(_candidates(run, front, target), key=_cost)])
+    cheapest_first = sorted(_candidates(run, front, target), key=lambda point: point.seconds.value)
+    run.load([point.levels for point in cheapest_first])
     asked = ask(run, front, target)
     run.prepare(budgets.finest)
     readings = run.read(budgets.finest)
@@ -149,10 +150,6 @@ def _candidates(run: Solver, front: Front, target: Target) -> tuple[Point, ...]:
     return tuple(dict.fromkeys((*cheaper, cheapest)))
 
 
-def _cost(point: Point) -> float:
-    return point.seconds.value
-
-
 def _in_time(
     run: Solver, front: Front, seconds: float, candidates: Sequence[Point]
 ) -> tuple[Point, Solved, float]:
@@ -163,9 +160,13 @@ def _in_time(
     found = for_budget(candidates, left, run.object, front.scale, work=work)
     readings = run.read(found.point.levels)
     if _shares(found.point):
-        # Reading what every such setting needs has shown how fast this machine is now.
-        speed = _speed(readings, front) * front.scale
-        found = for_budget(candidates, left, run.object, speed, readings.shared[1], work)
+        # Reading what every such setting needs has shown how fast this machine is now: seconds on the clock
+        # that a measured CPU second takes. On the machine of the curve it never counts as less than 1: a
+        # single fast reading promises nothing about the rest.
+        shared = [s.shared for p in front.points if _shares(p) for s in p.samples]
+        speed = readings.shared[1] / front.scale / float(np.median(shared))
+        speed = max(1.0, speed) if front.trusted else speed
+        found = for_budget(candidates, left, run.object, speed * front.scale, readings.shared[1], work)
     return found.point, run.solve(readings, found.point.levels), counting + found.seconds
 
 
@@ -192,17 +193,6 @@ def _shares(point: Point) -> bool:
     return any(sample.shared > 0.0 for sample in point.samples)
 
 
-def _speed(readings: Shared, front: Front) -> float:
-    """Seconds on the clock that a measured CPU second takes now, as reading what settings share shows.
-
-    On the machine of the curve it never counts as less than 1: a single fast reading promises
-    nothing about the rest.
-    """
-    shared = [s.shared for p in front.points if _shares(p) for s in p.samples]
-    now = readings.shared[1] / front.scale / float(np.median(shared))
-    return max(1.0, now) if front.trusted else now
-
-
 def _promise(run: Solver, front: Front, point: Point, solved: Solved) -> float:
     if solved.radius is None or not front.vouches:
         return float("inf")
@@ -218,7 +208,16 @@ def _apart(said: Mapping[str, Any], best: Mapping[str, Any]) -> float | None:
 
 def sentences(experiment: Experiment, cost: Mapping[str, Any]) -> tuple[str, ...]:
     """For people, what ``answer_as_asked`` gave."""
-    return (_took(experiment, cost), _finest(cost["finest"]))
+    finest, said = cost["finest"], []
+    if finest["refused"] is not None:
+        what = f"refused these readings: {finest['refused']}"
+    else:
+        if finest["apart_m"] is not None:
+            said.append(f"lie {1e3 * finest['apart_m']:.1f} mm from this answer")
+        if finest["error_m"] is not None:
+            said.append(f"would have been off by {1e3 * finest['error_m']:.1f} mm")
+        what = f"{' and '.join(said) or 'answer too'}; {finest['seconds']:.2g} s, not counted"
+    return _took(experiment, cost), f"the finest levels ({finest['setting']}) {what}"
 
 
 def _took(experiment: Experiment, cost: Mapping[str, Any]) -> str:
@@ -235,15 +234,3 @@ def _took(experiment: Experiment, cost: Mapping[str, Any]) -> str:
         f"error {1e3 * error:g} mm cannot be promised from these {experiment.plural}: {within}; the estimate "
         f"took {took}; one more {experiment.step} elsewhere on the object would tell most"
     )
-
-
-def _finest(finest: Mapping[str, Any]) -> str:
-    if finest["refused"] is not None:
-        return f"the finest levels ({finest['setting']}) refused these readings: {finest['refused']}"
-    said = []
-    if finest["apart_m"] is not None:
-        said.append(f"lie {1e3 * finest['apart_m']:.1f} mm from this answer")
-    if finest["error_m"] is not None:
-        said.append(f"would have been off by {1e3 * finest['error_m']:.1f} mm")
-    what = " and ".join(said) or "answer too"
-    return f"the finest levels ({finest['setting']}) {what}; {finest['seconds']:.2g} s, not counted"

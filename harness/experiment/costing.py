@@ -18,7 +18,7 @@ from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import sample_from, sample_json
 from harness.cost.provenance import code, machine
 from harness.effects.accuracy import Setting
-from harness.experiment.experiment import Experiment, RunCase, RunCell, Say
+from harness.experiment.experiment import Experiment, Measurement, RunCase, RunCell, Say
 from harness.experiment.tables import measurement_of
 
 _SCHEMA = 2
@@ -84,7 +84,7 @@ def measure(
     """
     folder.mkdir(parents=True, exist_ok=True)
     models = {} if models is None else models
-    measured = measurement_of(experiment)
+    measured, plural = measurement_of(experiment), experiment.plural
     stamp = {"schema": _SCHEMA, "machine": machine(), "sha256": code(measured.estimator)["sha256"]}
     with workers_of(workers) as pool:
         for first in range(0, len(work.cells), _ROUND):
@@ -98,30 +98,33 @@ def measure(
                     points = []
                     if cell in cases:
                         case = cases.pop(cell)
-                        points = _measured(experiment, case, work, say)
+                        points = _measured(measured, plural, case, work, say)
                         case.close()
                     tree: dict[str, Any] = {**stamp, "work": _work_json(work)}
-                    tree["points"] = [_one_json(p) for p in points]
+                    tree["points"] = [
+                        {
+                            "name": point.name,
+                            "levels": dict(point.levels),
+                            "condition": dict(point.condition),
+                            "sample": sample_json(point.samples[0]),
+                        }
+                        for point in points
+                    ]
                     write_text_whole(folder / f"{cell.name}.json", json.dumps(tree, allow_nan=False))
                 yield cell, points
 
 
-def _measured(experiment: Experiment, case: RunCase, work: Work, say: Say) -> list[Point]:
-    condition = dict(case.cell.conditions)
-    asked = [(count, setting) for count, setting in work.asked if count <= case.steps]
+def _measured(measured: Measurement, plural: str, case: RunCase, work: Work, say: Say) -> list[Point]:
     points = []
     try:
-        for count, setting in asked:
-            sample = case.sample(setting, count)
-            points.append(_point(experiment, setting, {**condition, experiment.plural: count}, sample))
+        for count, setting in work.asked:
+            if count <= case.steps:
+                sample, condition = case.sample(setting, count), {**case.cell.conditions, plural: count}
+                points.append(Point(measured.setting_name(setting), setting, condition, (sample,)))
     except TouchstoneError as error:
         say(f"{case.cell.name} was not answered: {error}")
         return []
     return points
-
-
-def _point(experiment: Experiment, setting: Setting, condition: Mapping[str, Any], sample: Sample) -> Point:
-    return Point(measurement_of(experiment).setting_name(setting), setting, condition, (sample,))
 
 
 def workers_of(number: int) -> Any:
@@ -131,12 +134,15 @@ def workers_of(number: int) -> Any:
 
 def gathered(experiment: Experiment, points: Sequence[Point], title: str, notes: Sequence[str] = ()) -> Curve:
     """One curve of the points of many runs."""
-    merged: dict[tuple[Any, ...], list[Point]] = {}
+    merged: dict[tuple[Any, ...], tuple[Point, dict[str, Sample]]] = {}
     for point in points:
-        merged.setdefault(_key(point), []).append(point)
+        key = tuple(sorted(point.levels.items())), tuple(sorted(point.condition.items()))
+        _, samples = merged.setdefault(key, (point, {}))
+        for sample in point.samples:
+            samples.setdefault(sample.run, sample)
     return Curve(
         program=experiment.name,
-        points=tuple(_joined(same) for same in merged.values()),
+        points=tuple(replace(first, samples=tuple(own.values())) for first, own in merged.values()),
         machine=machine(),
         code=code(measurement_of(experiment).estimator),
         made=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
@@ -151,39 +157,19 @@ def joined(experiment: Experiment, old: Curve, new: Curve) -> Curve:
     return replace(merged, made=new.made, notes=new.notes)
 
 
-def _key(point: Point) -> tuple[Any, ...]:
-    return tuple(sorted(point.levels.items())), tuple(sorted(point.condition.items()))
-
-
-def _joined(same: Sequence[Point]) -> Point:
-    samples: dict[str, Sample] = {}
-    for point in same:
-        for sample in point.samples:
-            samples.setdefault(sample.run, sample)
-    return replace(same[0], samples=tuple(samples.values()))
-
-
 def _kept(path: Path, stamp: Mapping[str, Any], work: Work) -> list[Point] | None:
     """The points of a run measured before, by this machine, this code and for the same work."""
     if not path.exists():
         return None
     tree = json.loads(path.read_text(encoding="utf-8"))
     same = all(tree.get(name) == value for name, value in {**stamp, "work": _work_json(work)}.items())
-    return [_one_from(point) for point in tree["points"]] if same else None
+    if not same:
+        return None
+    return [
+        Point(str(one["name"]), one["levels"], one["condition"], (sample_from(one["sample"]),))
+        for one in tree["points"]
+    ]
 
 
 def _work_json(work: Work) -> dict[str, Any]:
     return {"asked": [[count, dict(setting)] for count, setting in work.asked]}
-
-
-def _one_json(point: Point) -> dict[str, Any]:
-    return {
-        "name": point.name,
-        "levels": dict(point.levels),
-        "condition": dict(point.condition),
-        "sample": sample_json(point.samples[0]),
-    }
-
-
-def _one_from(tree: Mapping[str, Any]) -> Point:
-    return Point(str(tree["name"]), tree["levels"], tree["condition"], (sample_from(tree["sample"]),))

@@ -208,6 +208,7 @@ def _row(performed: Results, condition: Key, method: str, measured: Measurement)
     raw = np.array([one["error_m"] for one in found])
     symmetric = [one.get("error_symmetric_m") for one in found]
     answered = raw[["refused" not in one for one in found]]
+    columns = {c.key: [float(one[c.key]) for one in found if c.key in one] for c in measured.columns}
     return TableRow(
         dict(condition),
         method,
@@ -218,14 +219,8 @@ def _row(performed: Results, condition: Key, method: str, measured: Measurement)
         float(np.median([one["seconds"] for one in found])),
         len(raw) - len(answered),
         bootstrap(answered, mean) if 0 < len(answered) < len(raw) else None,
-        _means(found, [column.key for column in measured.columns]),
+        {key: float(np.mean(numbers)) for key, numbers in columns.items() if numbers},
     )
-
-
-def _means(found: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> dict[str, float]:
-    """By key, of the rows that have it; a key that none has is left out."""
-    values = {key: [float(one[key]) for one in found if key in one] for key in keys}
-    return {key: float(np.mean(numbers)) for key, numbers in values.items() if numbers}
 
 
 def _statistics(

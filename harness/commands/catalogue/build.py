@@ -70,10 +70,15 @@ def build(
     from harness.authoring.catalogue.build import build_all, build_plan, held
     from harness.authoring.catalogue.layout import BuildFolder
     from harness.authoring.catalogue.settings import write_settings
+    from harness.authoring.catalogue.worker import WorkerLimits
+    from harness.basics.quantities import TIME
 
     begun = time.perf_counter()
     spec = _spec(senses, profile, seed, up_to, modes, edge, sensor)
-    chosen_runner = _runner(runner, workers, address, _limits(time_limit, memory))
+    seconds = options.positive("--time-limit", time_limit, TIME)
+    assert seconds is not None
+    limits = WorkerLimits(seconds, None if memory is None else int(memory * 1e9))
+    chosen_runner = _runner(runner, workers, address, limits)
     _, rows, excluded = chosen.read(catalogue, meshes, material)
     of = BuildFolder(out.resolve(), None if stages is None else stages.resolve())
     plan = build_plan(rows, spec, of, retry)
@@ -116,15 +121,6 @@ def _spec(
         edge=options.positive("--edge", edge, LENGTH),
         sensor=described_sensor(sensor or DEFAULT_MAKE).sensor,
     )
-
-
-def _limits(time_limit: str, memory: float | None) -> "WorkerLimits":
-    from harness.authoring.catalogue.worker import WorkerLimits
-    from harness.basics.quantities import TIME
-
-    seconds = options.positive("--time-limit", time_limit, TIME)
-    assert seconds is not None
-    return WorkerLimits(seconds, None if memory is None else int(memory * 1e9))
 
 
 def _runner(name: str, workers: int, address: str | None, limits: "WorkerLimits") -> "Runner":

@@ -71,25 +71,24 @@ def _as_json(
         "materials": dict(Counter(row.material for row in catalogue.rows)),
         "notes": list(catalogue.notes),
         "excluded": [asdict(row) for row in excluded],
-        "intake": [_finding(each) for each in found],
-    }
-
-
-def _finding(found: "IntakeFinding") -> dict[str, Any]:
-    return {
-        "name": found.name,
-        "material": found.material,
-        "mesh": found.mesh,
-        "verdict": _verdict(found),
-        "reason": found.reason,
-        "remarks": list(found.remarks),
-        "units": found.units,
-        "longest_side_m": found.longest_side,
-        "label_m": found.label,
-        "watertight": found.watertight,
-        "faces": found.faces,
-        "wall_m": found.wall,
-        "mass_kg": found.mass,
+        "intake": [
+            {
+                "name": each.name,
+                "material": each.material,
+                "mesh": each.mesh,
+                "verdict": _verdict(each),
+                "reason": each.reason,
+                "remarks": list(each.remarks),
+                "units": each.units,
+                "longest_side_m": each.longest_side,
+                "label_m": each.label,
+                "watertight": each.watertight,
+                "faces": each.faces,
+                "wall_m": each.wall,
+                "mass_kg": each.mass,
+            }
+            for each in found
+        ],
     }
 
 
@@ -110,7 +109,10 @@ def _print(
     for finding in found:
         for sentence in filter(None, (finding.reason, *finding.remarks)):
             ANSWERS.print(f"{finding.name}: {sentence}", markup=False)
-    _print_excluded(excluded)
+    for row in excluded[:_LISTED]:
+        ANSWERS.print(f"{row.name}: excluded, {row.reason}", markup=False)
+    if len(excluded) > _LISTED:
+        ANSWERS.print(f"and {len(excluded) - _LISTED} more excluded; --json lists them all")
     counts = Counter(_verdict(finding) for finding in found)
     verdicts = ", ".join(f"{counts[name]} {name}" for name in ("ready", "look", "excluded") if counts[name])
     materials = ", ".join(
@@ -122,13 +124,6 @@ def _print(
 
 
 _LISTED = 20
-
-
-def _print_excluded(excluded: "tuple[ExcludedRow, ...]") -> None:
-    for row in excluded[:_LISTED]:
-        ANSWERS.print(f"{row.name}: excluded, {row.reason}", markup=False)
-    if len(excluded) > _LISTED:
-        ANSWERS.print(f"and {len(excluded) - _LISTED} more excluded; --json lists them all")
 
 
 def _table(found: "list[IntakeFinding]") -> Table:

@@ -214,7 +214,12 @@ def _print(name: str, found: "FileModes", of: "Material", count: int | None) -> 
     ANSWERS.print(drawn)
     if len(listed) > _SHOWN:
         ANSWERS.print(f"... and {len(listed) - _SHOWN} more up to {listed[-1]:.6g} Hz; --json lists all")
-    ANSWERS.print(_certificate(found))
+    below = f"below {modes_.limit:.6g} Hz" if modes_.limit < float("inf") else "in all"
+    number = f"{len(modes_.frequencies)} modes {below}"
+    if found.solution.certified:
+        ANSWERS.print(f"certified: exactly {number}, counted by the inertia of the system")
+    else:
+        ANSWERS.print(f"not certified: {number} were found, but the factors do not say whether all")
     held = f"{found.held} nodes held, " if found.held else ""
     kind = "its own nodes" if found.volume else f"tetrahedra of {1e3 * (found.edge or 0.0):.3g} mm"
     ANSWERS.print(
@@ -222,12 +227,3 @@ def _print(name: str, found: "FileModes", of: "Material", count: int | None) -> 
         f"rigid motions left out ({found.bodies} {'body' if found.bodies == 1 else 'bodies'})"
     )
     ANSWERS.print(", ".join(f"{stage} {took:.2f} s" for stage, took in found.seconds.items()))
-
-
-def _certificate(found: "FileModes") -> str:
-    modes_ = found.solution.modes
-    below = f"below {modes_.limit:.6g} Hz" if modes_.limit < float("inf") else "in all"
-    number = len(modes_.frequencies)
-    if found.solution.certified:
-        return f"certified: exactly {number} modes {below}, counted by the inertia of the system"
-    return f"not certified: {number} modes {below} were found, but the factors do not say whether all"
