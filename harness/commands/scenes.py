@@ -127,31 +127,22 @@ def _asked(
     section: type[Section] | None, keys: Mapping[str, Any], assignments: Sequence[str]
 ) -> dict[str, Any]:
     """Keys of an experiment's table and what they are to be, as JSON has it."""
-    asked = {key: str_or_int(value) for key, value in keys.items() if value is not None}
+    given = {key: value for key, value in keys.items() if value is not None}
+    asked: dict[str, Any] = {k: value if isinstance(value, int) else str(value) for k, value in given.items()}
     for text in assignments:
         key, equals, value = text.partition("=")
         if not equals:
             raise WrongUse(f"--set {text}: write KEY=VALUE, as contacts=4")
-        asked[key.strip()] = _plain(value.strip())
+        try:
+            asked[key.strip()] = tomllib.loads(f"value = {value.strip()}")["value"]
+        except (ValueError, RecursionError):  # words without quotes are text
+            asked[key.strip()] = value.strip()
     known = set() if section is None else set(section.model_fields)
     for key in asked:
         if key not in known:
             option = f"--{key}" if keys.get(key) is not None else f"--set {key}"
             raise WrongUse(f"{option}: this experiment has no setting {key!r}; {nearest(key, known)}")
     return asked
-
-
-def _plain(text: str) -> Any:
-    """A value as TOML has it; words without quotes are text."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except (ValueError, RecursionError):
-        return text
-
-
-def str_or_int(value: Any) -> Any:
-    """An option's value as JSON would have it."""
-    return value if isinstance(value, int) else str(value)
 
 
 def _with(scene: SceneFile, tables: Mapping[str, Mapping[str, Any]]) -> SceneFile:

@@ -13,7 +13,7 @@ from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.basics.store import Store, default_folder
 from harness.bench.scene import SceneFile
-from harness.bench.scene_camera import Lamp, scene_lamps, scene_pinhole
+from harness.bench.scene_camera import scene_lamps, scene_pinhole
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
@@ -219,15 +219,14 @@ def camera_sources(scene: SceneFile, station: Station, mesh: Mesh, wanted: Seque
     if "camera" in wanted:
         sources["camera"] = scene_pinhole(station, scene, mesh)
     if "camera.lights" in wanted:
-        sources["camera.lights"] = tuple(_as_strong(lamp) for lamp in scene_lamps(scene, mesh))
+        # The light of a white lamp is as strong as its colour says.
+        sources["camera.lights"] = tuple(
+            DirectionalLight(lamp.light.direction, lamp.light.irradiance * float(lamp.colour[0]))
+            for lamp in scene_lamps(scene, mesh)
+        )
     if "object.appearance" in wanted and scene.object.builtin is not None:
         # Loaded by those alone who follow rays on the mesh.
         from harness.sim.light.appearance_source import builtin_appearance
 
         sources["object.appearance"] = builtin_appearance(scene.object.builtin, scene.object.drawn_scale)
     return sources
-
-
-def _as_strong(lamp: Lamp) -> DirectionalLight:
-    """The light of a white lamp, as strong as its colour says."""
-    return DirectionalLight(lamp.light.direction, lamp.light.irradiance * float(lamp.colour[0]))

@@ -17,7 +17,7 @@ from harness.bench.station_file import Station
 from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import sample_from, sample_json
 from harness.cost.provenance import code, machine
-from harness.effects.accuracy import Setting
+from harness.effects.accuracy import Level, Setting
 from harness.experiment.experiment import Experiment, Measurement, RunCase, RunCell, Say
 from harness.experiment.tables import measurement_of
 
@@ -119,7 +119,8 @@ def _measured(measured: Measurement, plural: str, case: RunCase, work: Work, say
     try:
         for count, setting in work.asked:
             if count <= case.steps:
-                sample, condition = case.sample(setting, count), {**case.cell.conditions, plural: count}
+                condition: dict[str, Level] = {**case.cell.conditions, plural: count}
+                sample = case.sample(setting, count)
                 points.append(Point(measured.setting_name(setting), setting, condition, (sample,)))
     except TouchstoneError as error:
         say(f"{case.cell.name} was not answered: {error}")

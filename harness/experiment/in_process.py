@@ -62,18 +62,13 @@ def recorded(
     folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix=".performing-", dir=folder) as aside:
         made = performed(experiment, cell, scene, station, Path(aside) / cell.name)
-        return _moved(made, path)
-
-
-def _moved(made: Recording, path: Path) -> Recording:
-    """Move a run with its truth to its place; where another process was first, its run stays."""
-    with hold_briefly(path.with_name(f".{path.name}.lock")):
-        if not path.exists():
-            for truth in truth_paths(made):
-                if truth.exists():
-                    truth.replace(path.parent / truth.name)
-            made.folder.replace(path)
-    return Recording(path)
+        with hold_briefly(path.with_name(f".{path.name}.lock")):
+            if not path.exists():  # where another process was first, its run stays
+                for truth in truth_paths(made):
+                    if truth.exists():
+                        truth.replace(path.parent / truth.name)
+                made.folder.replace(path)
+        return Recording(path)
 
 
 def _require_same(found: Recording, experiment: Experiment, cell: RunCell, scene: SceneFile) -> None:

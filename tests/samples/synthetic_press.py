@@ -5,9 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from experiments.contact_localization.accuracy.solving import contact_of
-from experiments.contact_localization.posterior.hypotheses import Contact
-from experiments.contact_localization.touch.touch import TouchNoise
+from experiments.contact_localization.touch.touch import Contact, TouchNoise, contact_of
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, inverse, rotation_from_vector, transform
 from harness.basics.mesh import Mesh

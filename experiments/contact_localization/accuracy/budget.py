@@ -19,10 +19,10 @@ from experiments.contact_localization.answer import observe, prior_of
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import METHOD, SENSES, SPACING
-from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.noise import noise_at
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.section import Localization
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray
 from harness.bench.scene import SceneFile
 from harness.cost.curve import Curve

@@ -11,9 +11,8 @@ from experiments.contact_localization.accuracy.dials import SIMULATED, accuracy_
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import BLOCK, METHOD, ROUNDS, SAMPLES, SPACING
 from experiments.contact_localization.posterior.estimate import Estimate, locate
-from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.noise import noise_at
-from experiments.contact_localization.touch.touch import TouchNoise, touch_map
+from experiments.contact_localization.touch.touch import Contact, contact_of
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.bench.bench_errors import BenchErrors
@@ -241,17 +240,3 @@ def _widened(stated: Estimate, wider: Estimate, factor: float) -> Estimate:
         "own residuals: the region is that of errors so large; check the bench, or state them"
     )
     return replace(wider, seconds=seconds, doubts=(*wider.doubts, doubt))
-
-
-CONTACT_THRESHOLD = 0.12e-3
-"""Metres of indentation, averaged over a compared pixel, below which no contact is seen."""
-
-
-def contact_of(
-    base_from_gel: FloatArray, heights: FloatArray, pitch: float, block: int, noise: TouchNoise
-) -> Contact:
-    """A contact from its pose ``(4, 4)`` and its height map in metres at ``pitch`` metres a pixel."""
-    fine = touch_map(heights, pitch, block, noise.skirt, noise.edge, CONTACT_THRESHOLD)
-    # A contact of one fine pixel is still seen in the four times larger one that holds it.
-    coarse = touch_map(heights, pitch, 2 * block, noise.skirt, noise.edge, 0.25 * CONTACT_THRESHOLD)
-    return Contact(base_from_gel, fine, coarse)

@@ -30,10 +30,10 @@ from experiments.contact_localization.posterior.baselines import (
 )
 from experiments.contact_localization.posterior.dials import METHOD, PARTICLES, SENSES, SPACING
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.noise import noise_at
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.report.result import fit_of
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
 from harness.basics.symmetry import SymmetryGroup, find_symmetries

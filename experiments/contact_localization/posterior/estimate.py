@@ -24,7 +24,7 @@ from experiments.contact_localization.posterior.dials import (
     Senses,
 )
 from experiments.contact_localization.posterior.grid import on_samples, refine
-from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, anchors
+from experiments.contact_localization.posterior.hypotheses import Hypotheses, anchors
 from experiments.contact_localization.posterior.noise import UNKNOWNS, Noise
 from experiments.contact_localization.posterior.particle import particle_filter
 from experiments.contact_localization.posterior.posterior import (
@@ -42,6 +42,7 @@ from experiments.contact_localization.sound.consistency import (
     judge_sound,
 )
 from experiments.contact_localization.sound.evidence import StrikeEvidence, by_sound, hear
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import FitRefused, WrongUse
 from harness.basics.faces.nearest import nearest_point

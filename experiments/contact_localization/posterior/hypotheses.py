@@ -4,48 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from experiments.contact_localization.touch.touch import TouchMap
 from harness.basics.arrays import FloatArray, IntArray
 
 _GOLDEN = 0.6180339887498949
-
-UNKNOWN_INDENTATION = 1.0e-3
-"""Metres that a press usually leaves at the gel's centre."""
-
-
-@dataclass(frozen=True, eq=False)
-class Contact:
-    """One contact as the estimator knows it.
-
-    Attributes:
-        base_from_gel: ``(4, 4)``; its translation is used only against other contacts'.
-        touch: what the gel read; None for a contact whose image must not be used.
-        coarse: the same at half the resolution, for a first look at many places.
-    """
-
-    base_from_gel: FloatArray
-    touch: TouchMap | None = None
-    coarse: TouchMap | None = None
-
-    @property
-    def shows_contact(self) -> bool:
-        """Whether there is an image and it shows one."""
-        return self.touch is not None and len(self.touch.touched) > 0
-
-    @property
-    def axis(self) -> FloatArray:
-        """``(3,)`` unit, in base: where the tool points."""
-        return np.asarray(self.base_from_gel[:3, 2])
-
-    @property
-    def indentation(self) -> float:
-        """Metres at the gel's centre, or what presses usually leave where the image does not say."""
-        if self.touch is None or not self.shows_contact:
-            return UNKNOWN_INDENTATION
-        heights = self.touch.heights
-        rows, columns = heights.shape
-        middle = heights[(rows - 1) // 2 : rows // 2 + 1, (columns - 1) // 2 : columns // 2 + 1]
-        return float(middle.mean())
 
 
 @dataclass(frozen=True, eq=False)

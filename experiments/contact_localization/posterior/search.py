@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, best_of
+from experiments.contact_localization.posterior.hypotheses import Hypotheses, best_of
 from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores, possible_anchors
 from experiments.contact_localization.posterior.noise import (
     Noise,
@@ -20,7 +20,7 @@ from experiments.contact_localization.posterior.noise import (
     moves,
     place_noise,
 )
-from experiments.contact_localization.touch.touch import TouchMap, best_fit, touch_terms
+from experiments.contact_localization.touch.touch import Contact, TouchMap, best_fit, touch_terms
 from harness.basics.arrays import FloatArray, IntArray
 from harness.bench.bench_errors import USUAL
 from harness.sim.gel.view import ToolView, half_as_fine, view_along

@@ -23,9 +23,14 @@ from harness.sim.gel.view import ToolView
 UPRIGHT: FloatArray = read_only(np.zeros(3))
 """Of a gel that stands as its view does."""
 
-
 LEVEL_SLOPE = 0.06
 """Mean slope of a pixel below which it may be the gel at rest."""
+
+UNKNOWN_INDENTATION = 1.0e-3
+"""Metres that a press usually leaves at the gel's centre."""
+
+CONTACT_THRESHOLD = 0.12e-3
+"""Metres of indentation, averaged over a compared pixel, below which no contact is seen."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +105,41 @@ class TouchMap:
         return self.heights, self.pitch, self.touched, self.flat, self.skirt, self.edge
 
 
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """One contact as the estimator knows it.
+
+    Attributes:
+        base_from_gel: ``(4, 4)``; its translation is used only against other contacts'.
+        touch: what the gel read; None for a contact whose image must not be used.
+        coarse: the same at half the resolution, for a first look at many places.
+    """
+
+    base_from_gel: FloatArray
+    touch: TouchMap | None = None
+    coarse: TouchMap | None = None
+
+    @property
+    def shows_contact(self) -> bool:
+        """Whether there is an image and it shows one."""
+        return self.touch is not None and len(self.touch.touched) > 0
+
+    @property
+    def axis(self) -> FloatArray:
+        """``(3,)`` unit, in base: where the tool points."""
+        return np.asarray(self.base_from_gel[:3, 2])
+
+    @property
+    def indentation(self) -> float:
+        """Metres at the gel's centre, or what presses usually leave where the image does not say."""
+        if self.touch is None or not self.shows_contact:
+            return UNKNOWN_INDENTATION
+        heights = self.touch.heights
+        rows, columns = heights.shape
+        middle = heights[(rows - 1) // 2 : rows // 2 + 1, (columns - 1) // 2 : columns // 2 + 1]
+        return float(middle.mean())
+
+
 def touch_map(
     heights: FloatArray, pitch: float, block: int, skirt: float, edge: float, threshold: float
 ) -> TouchMap:
@@ -130,6 +170,16 @@ def touch_map(
         read_only(_half_kernel(skirt / coarse_pitch)),
         read_only(_half_kernel(edge / coarse_pitch)),
     )
+
+
+def contact_of(
+    base_from_gel: FloatArray, heights: FloatArray, pitch: float, block: int, noise: TouchNoise
+) -> Contact:
+    """A contact from its pose ``(4, 4)`` and its height map in metres at ``pitch`` metres a pixel."""
+    fine = touch_map(heights, pitch, block, noise.skirt, noise.edge, CONTACT_THRESHOLD)
+    # A contact of one fine pixel is still seen in the four times larger one that holds it.
+    coarse = touch_map(heights, pitch, 2 * block, noise.skirt, noise.edge, 0.25 * CONTACT_THRESHOLD)
+    return Contact(base_from_gel, fine, coarse)
 
 
 def _half_kernel(sigma: float) -> FloatArray:

@@ -1,18 +1,22 @@
 """``touchstone sim touch``: what a gel shows of a height map, or of a mesh that it is pressed onto."""
 
+import math
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
 from harness.commands import force_options as forces
 from harness.commands import options, places
 from harness.commands.output import emit, warn
-from harness.commands.press import touch_sources as sources
 from harness.commands.press.touch_answer import Touched, as_json, draw, print_answer
-from harness.commands.press.touch_sources import refuse
+
+if TYPE_CHECKING:
+    from harness.bench.scene import SceneFile
+    from harness.sim.gel.height_file import Heights
+    from harness.sim.optics.pressed_gel import Gel
 
 
 def touch(
@@ -159,38 +163,48 @@ def touch(
 
     Try: touchstone sim touch builtin:mug --contact -0.04 0 0.05 --depth 1mm --tilt 5deg --out touch.png
     """
-    out = _checked_files(out, picture, height_out, pressure_out)
+    if out is None:
+        _refuse("say where the picture goes: --out FILE.png")
+    options.require_files(
+        ("--out", out, ".png"),
+        ("--picture", picture, ".png"),
+        ("--height-out", height_out, ".npy"),
+        ("--pressure-out", pressure_out, ".npy"),
+    )
     own = {"--gel-poisson": gel_poisson, "--force-table": force_table, "--pressure-out": pressure_out}
     forces.require_force(force, level or [], gel_modulus, gel_modulus_error, **own)
     begun = time.perf_counter()
     if shadow is None and heights_of == "gel" and reached is None:
         shadow = False
-    gel = sources.gel(sensor, calibration, pitch, thickness, background, shadow, noise, seed, markers)
+    gel = _described_gel(sensor, calibration, pitch, thickness, background, shadow, noise, seed, markers)
     table, levels = forces.measured(force_table, level or [])
     gel = replace(gel, elastic=forces.stiffness(gel_modulus, gel_modulus_error, gel_poisson), forces=table)
     loaded = time.perf_counter() - begun
     if (mesh is None) == (height is None):
-        refuse("say what is pressed: either a MESH with --contact X Y Z, or --height FILE.npy")
+        _refuse("say what is pressed: either a MESH with --contact X Y Z, or --height FILE.npy")
     if height is not None:
         of_mesh = (contact, vertex, depth, tilt, azimuth, yaw, units, up_axis, objectfile)
         if any(given is not None for given in of_mesh):
-            refuse(
+            _refuse(
                 "--contact, --vertex, --depth, --tilt, --azimuth, --yaw, --units, --up-axis and --objectfile "
                 "are of a mesh; --height is a map"
             )
-        touched = sources.of_heights(height, heights_of, reached, gel, levels, force)
+        touched = _press_heights(height, heights_of, reached, gel, levels, force)
     else:
         if (contact is None and vertex is None) or heights_of != "object" or reached is not None:
-            refuse(
+            _refuse(
                 "a mesh needs --contact X Y Z or --vertex N, and --heights-of and --reached are of --height"
             )
         assert mesh is not None
         pose = (depth, tilt, azimuth, yaw)
-        touched = sources.of_mesh(
-            mesh, (units, up_axis), contact, vertex, pose, gel, levels, objectfile, force
-        )
+        touched = _press_mesh(mesh, (units, up_axis), contact, vertex, pose, gel, levels, objectfile, force)
     if pressure_out is not None:
-        _write_pressure(pressure_out, touched)
+        from harness.basics.npz_file import write_array
+
+        assert touched.press.force is not None
+        if touched.press.levels[forces.LEVEL] == "table":
+            _refuse("a table of forces says how much, not where; leave --pressure-out out, or --force-table")
+        write_array(pressure_out, touched.press.force.pressure[0])
     return _finish(touched, {"calibration": loaded}, out, live, picture, height_out, json)
 
 
@@ -203,6 +217,9 @@ def _finish(
     height_out: Path | None,
     json: bool,
 ) -> int:
+    import numpy as np
+
+    from harness.basics.npz_file import write_array
     from harness.picture.image_file import read_image, write_png
     from harness.picture.square_pixels import made_square
 
@@ -210,7 +227,8 @@ def _finish(
     whole = touched.compared(seen, before)
     write_png(out, whole.press.image)
     if height_out is not None:
-        _write_heights(height_out, whole)
+        heights, missing = whole.press.heights, whole.press.missing
+        write_array(height_out, heights if missing is None else np.where(missing, np.nan, heights))
     if picture is not None:
         draw(whole, picture)
     for sentence in whole.notes:
@@ -222,34 +240,135 @@ def _finish(
     return 0
 
 
-def _checked_files(
-    out: Path | None, picture: Path | None, height_out: Path | None, pressure_out: Path | None
-) -> Path:
-    if out is None:
-        refuse("say where the picture goes: --out FILE.png")
-    options.require_files(
-        ("--out", out, ".png"),
-        ("--picture", picture, ".png"),
-        ("--height-out", height_out, ".npy"),
-        ("--pressure-out", pressure_out, ".npy"),
+def _refuse(sentence: str) -> NoReturn:
+    """Raise ``WrongUse``."""
+    from harness.basics.errors import WrongUse
+
+    raise WrongUse(sentence)
+
+
+def _described_gel(
+    sensor: str | None,
+    calibration: str | None,
+    pitch: str | None,
+    thickness: str | None,
+    background: Path | None,
+    shadow: bool | None,
+    noise: float,
+    seed: int,
+    markers: Path | None = None,
+) -> "Gel":
+    """The gel that the options describe; ``WrongUse`` and ``CalibrationRefused`` as ``known_gel``."""
+    from dataclasses import replace
+
+    from harness.basics.quantities import LENGTH
+    from harness.picture.image_file import read_image
+    from harness.sim.gel.marker_file import read_markers
+    from harness.sim.optics.known_gel import known_gel
+
+    gel = known_gel(
+        sensor,
+        calibration,
+        pitch=options.positive("--pitch", pitch, LENGTH),
+        thickness=options.positive("--thickness", thickness, LENGTH),
+        background=None if background is None else read_image(background),
+        shadow=shadow,
     )
-    return out
+    if not math.isfinite(noise):
+        _refuse(f"--noise of {noise} grey levels cannot be drawn; give a finite number")
+    gel = replace(gel, noise=noise, seed=seed)
+    return gel if markers is None else gel.with_dots(read_markers(markers))
 
 
-def _write_pressure(path: Path, touched: Touched) -> None:
-    from harness.basics.npz_file import write_array
+def _press_heights(
+    path: Path, of: str, under: Path | None, gel: "Gel", levels: list[str], force: bool = False
+) -> Touched:
+    """The press of a height map; ``under`` is how deep the object reaches below a gel's surface."""
+    from harness.effects.touch_press import press_heights
+    from harness.sim.gel.height_file import read_heights
 
-    found = touched.press.force
-    assert found is not None
-    if touched.press.levels[forces.LEVEL] == "table":
-        refuse("a table of forces says how much, not where; leave --pressure-out out, or --force-table")
-    write_array(path, found.pressure[0])
+    if of not in ("object", "gel"):
+        _refuse(f"--heights-of {of} is no kind of height map; there are object and gel")
+    kind: Heights = "object" if of == "object" else "gel"
+    begun = time.perf_counter()
+    given = read_heights(path, gel.sensor, kind)
+    if under is not None and kind == "object":
+        _refuse("--reached stands beside the surface of a gel; an object's --height says it already")
+    reached = None if under is None else read_heights(under, gel.sensor)
+    read = time.perf_counter() - begun
+    missing = given.missing if reached is None else given.missing | reached.missing
+    touched = None if reached is None else reached.heights
+    scene = _scene(str(path), (None, None), gel)
+    press = press_heights(given.heights, kind, gel, scene, levels, touched, missing, force)
+    return Touched(press, str(path), seconds={"read": read})
 
 
-def _write_heights(path: Path, touched: Touched) -> None:
-    import numpy as np
+def _press_mesh(
+    mesh: str,
+    file: tuple[str | None, str | None],
+    contact: places.Coordinates | None,
+    vertex: int | None,
+    pose: tuple[str | None, str | None, str | None, str | None],
+    gel: "Gel",
+    levels: list[str],
+    objectfile: Path | None = None,
+    force: bool = False,
+) -> Touched:
+    """Press a mesh onto a gel.
 
-    from harness.basics.npz_file import write_array
+    Args:
+        mesh: a file, a built-in object or an ObjectFile.
+        file: unit of the file's numbers and axis that points up; None where left out.
+        contact: where it is pressed, or None.
+        vertex: number of the vertex where it is pressed, or None.
+        pose: depth, tilt, azimuth and yaw with their units; None where left out.
+        gel: onto which it is pressed.
+        levels: of knobs.
+        objectfile: folder of the object's networks.
+        force: whether the force is computed.
+    """
+    from harness.basics.quantities import ANGLE, LENGTH
+    from harness.effects.scene_object import known_object
+    from harness.effects.touch_press import press_mesh
+    from harness.sim.gel.press_pose import gel_from_object
+    from harness.sim.gel.presses import Presses
 
-    heights, missing = touched.press.heights, touched.press.missing
-    write_array(path, heights if missing is None else np.where(missing, np.nan, heights))
+    depth = options.quantity("--depth", pose[0] or "1mm", LENGTH)
+    tilt, azimuth, yaw = (
+        options.quantity(option, text or "0deg", ANGLE)
+        for option, text in zip(("--tilt", "--azimuth", "--yaw"), pose[1:], strict=True)
+    )
+    begun = time.perf_counter()
+    scene = _scene(mesh, file, gel, objectfile)
+    known = known_object(scene)
+    place = places.pressed_place(known.mesh, contact, vertex)
+    at = gel_from_object(place, depth, tilt, azimuth, yaw, gel.sensor.gel_thickness)
+    read = time.perf_counter() - begun
+    sources = {
+        "object.mesh": known.mesh,
+        "contact.gel_from_object": at[None],
+        "contact.presses": Presses.one(place.point, place.normal, depth, tilt, azimuth, yaw),
+    }
+    press = press_mesh(sources, gel, scene, levels, force)
+    asked = {"depth_m": depth, "tilt_rad": tilt, "azimuth_rad": azimuth, "yaw_rad": yaw}
+    return Touched(press, mesh, place, at, asked, (*known.read, *known.warnings), seconds={"mesh": read})
+
+
+def _scene(
+    what: str, file: tuple[str | None, str | None], gel: "Gel", objectfile: Path | None = None
+) -> "SceneFile":
+    """A table with nothing on it but what is touched; touch does not depend on its material."""
+    from harness.basics.toml_file import validate
+    from harness.bench.scene import SceneFile, scene_from_options
+    from harness.bench.scene_objectfile import holds_objectfile, objectfile_folder
+    from harness.objects.builtin import BUILTIN
+
+    if what.endswith(".npy"):
+        tree = {"schema": 1, "object": {"mesh": what, "material": "steel"}}
+        scene = validate(tree, SceneFile, "the options")
+    else:
+        says_its_own = what.startswith(BUILTIN) or holds_objectfile(objectfile_folder(what, Path.cwd()))
+        material = None if says_its_own else "steel"
+        named = None if objectfile is None else str(objectfile)
+        scene = scene_from_options(what, material, file[0], objectfile=named, up_axis=file[1])
+    return scene.model_copy(update={"sensors": scene.sensors.model_copy(update={"noise": gel.noise > 0.0})})

@@ -177,8 +177,13 @@ def print_answer(touched: Touched, out: Path, picture: Path | None) -> None:
         ANSWERS.print("no contact")
     if (pressed := force_row(press)) is not None:
         ANSWERS.print(pressed)
-    for row in _rows(touched):
-        ANSWERS.print(row)
+    if touched.live is not None:
+        compared = _compared(touched)
+        for name in ("simulated", "background"):
+            ANSWERS.print(
+                f"live against {name}: {_decibels(compared[name], 'psnr_db')} over the frame, "
+                f"{_decibels(compared[name], 'psnr_contact_db')} over the contact"
+            )
     ANSWERS.print(f"{out}", markup=False)
     if picture is not None:
         ANSWERS.print(f"{picture}", markup=False)
@@ -209,17 +214,6 @@ def _compared(touched: Touched) -> dict[str, Any]:
             "identical": math.isinf(full),
         }
     return found
-
-
-def _rows(touched: Touched) -> list[str]:
-    if touched.live is None:
-        return []
-    compared = _compared(touched)
-    return [
-        f"live against {name}: {_decibels(compared[name], 'psnr_db')} over the frame, "
-        f"{_decibels(compared[name], 'psnr_contact_db')} over the contact"
-        for name in ("simulated", "background")
-    ]
 
 
 def _captions(touched: Touched) -> tuple[str, ...]:

@@ -99,7 +99,8 @@ def cost(
                 curve = joined(kind, old, curve)
         save(curve, path)
     save(curve, out / "curve.json")
-    page = write_cost_page(curve, (), _styled(kind), kind.plural, out)
+    styled = tuple(knob.name for knob in kind.own_knobs if knob.kind == "method")  # marks differ by these
+    page = write_cost_page(curve, (), styled, kind.plural, out)
     result = _result(curve, path, page)
     if json:
         emit(result)
@@ -108,11 +109,6 @@ def cost(
     ANSWERS.print(f"curve: {path}", markup=False)
     ANSWERS.print(f"page: {page}", markup=False)
     return 0
-
-
-def _styled(kind: Any) -> tuple[str, ...]:
-    """Dials whose levels are methods: marks of a chart differ by them."""
-    return tuple(knob.name for knob in kind.own_knobs if knob.kind == "method")
 
 
 def _gap(name: str) -> str:

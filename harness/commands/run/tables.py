@@ -82,7 +82,9 @@ def tables(
     kind = named(context.info_name or "")
     measured = measurement_of(kind)
     out = out or Path("runs/tables") / kind.name
-    folder = data or _data_folder()
+    named_folder = os.environ.get("TOUCHSTONE_DATA")
+    shared = Path(named_folder) if named_folder else Path.cwd().parent / "shared" / "data"
+    folder = data or (shared if (shared / "meshes").is_dir() else None)
     if folder is None:
         warn("real meshes not found (--data, TOUCHSTONE_DATA or ../shared/data): built-in objects only")
     scenes = objects(folder, more=measured.subjects)
@@ -125,12 +127,6 @@ def tables(
     return 0
 
 
-def _data_folder() -> Path | None:
-    named = os.environ.get("TOUCHSTONE_DATA")
-    candidates = [Path(named)] if named else [Path.cwd().parent / "shared" / "data"]
-    return next((path for path in candidates if (path / "meshes").is_dir()), None)
-
-
 def _by_object(results: Any, key: Any, mean_of: Any, values: Any) -> dict[str, Any]:
     """Means of one condition on each object: of the error, and of what else the experiment prints so."""
     return {
@@ -160,7 +156,12 @@ def print_table(table: Sequence["TableRow"], columns: Sequence["MeasuredColumn"]
         _print(f"{title}; mm [5 to 95 %]", _HEADINGS, [_cells(row) for row in chosen])
         if columns:
             headings = ["method", *(f"{column.heading}, {column.unit}" for column in columns)]
-            _print(f"{title}; means", headings, [_means(row, columns) for row in chosen])
+            means = [
+                [f"{_SCALES[c.unit] * row.means[c.key]:.1f}" if c.key in row.means else "" for c in columns]
+                for row in chosen
+            ]
+            lines = [[row.method, *shown] for row, shown in zip(chosen, means, strict=True)]
+            _print(f"{title}; means", headings, lines)
 
 
 def print_by_object(
@@ -227,14 +228,6 @@ def _cells(row: "TableRow") -> list[str]:
         "" if row.held is None else f"{100 * row.held:.0f} %",
         f"{row.seconds:.2f}",
     ]
-
-
-def _means(row: "TableRow", columns: Sequence["MeasuredColumn"]) -> list[str]:
-    shown = [
-        f"{_SCALES[column.unit] * row.means[column.key]:.1f}" if column.key in row.means else ""
-        for column in columns
-    ]
-    return [row.method, *shown]
 
 
 def _interval(interval: "Interval", scale: float, digits: int) -> str:

@@ -17,13 +17,13 @@ import numpy as np
 
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.baselines import MfccTable, mfcc_filter, without_images
-from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.posterior import best_point
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.sound.evidence import by_sound, sound_nats
 from experiments.contact_localization.sound.gains import GainTable, gain_table
 from experiments.contact_localization.sound.likelihood import SoundNoise, SoundTerm
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.nearest import nearest_point
 from harness.basics.geometry import rotation_about, transform, translation

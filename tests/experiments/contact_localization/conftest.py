@@ -3,9 +3,9 @@
 import pytest
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.search import Search
+from experiments.contact_localization.touch.touch import Contact
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples.synthetic_press import BASE_FROM_OBJECT, PRESSES, contact, stepped_block

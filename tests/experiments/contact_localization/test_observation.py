@@ -5,10 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.solving import contact_of
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.hypotheses import Contact
-from experiments.contact_localization.touch.touch import TouchNoise
+from experiments.contact_localization.touch.touch import Contact, TouchNoise, contact_of
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import DataRefused, RecordingDamaged, WrongUse
 from harness.basics.geometry import quaternion_from_rotation, rotation_about, rotation_from_vector, transform

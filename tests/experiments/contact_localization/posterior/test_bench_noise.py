@@ -8,9 +8,9 @@ import pytest
 
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.estimate import locate
-from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.noise import Noise, noise_at
 from experiments.contact_localization.posterior.search import Search
+from experiments.contact_localization.touch.touch import Contact
 from harness.bench.bench_errors import USUAL
 from tests.support.localization import dials
 

@@ -12,9 +12,10 @@ from experiments.contact_localization.posterior.consistency import (
     refuse_bad_fit,
     refuse_inside_out,
 )
-from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses
+from experiments.contact_localization.posterior.hypotheses import Hypotheses
 from experiments.contact_localization.posterior.noise import SAME_AXIS, SAME_PLACE, Noise
 from experiments.contact_localization.posterior.search import Search
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import frame_facing, transform

@@ -5,14 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.contact_localization.accuracy.solving import contact_of
-from experiments.contact_localization.posterior.hypotheses import (
-    UNKNOWN_INDENTATION,
-    Contact,
-    Hypotheses,
-    best_of,
-)
-from experiments.contact_localization.touch.touch import TouchNoise
+from experiments.contact_localization.posterior.hypotheses import Hypotheses, best_of
+from experiments.contact_localization.touch.touch import UNKNOWN_INDENTATION, Contact, TouchNoise, contact_of
 from harness.basics.arrays import FloatArray
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.gel.height_map import RasterMesh

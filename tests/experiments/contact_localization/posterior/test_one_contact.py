@@ -6,9 +6,10 @@ import pytest
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.estimate import locate
 from experiments.contact_localization.posterior.grid import on_samples, refine
-from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses
+from experiments.contact_localization.posterior.hypotheses import Hypotheses
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.search import Search
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.geometry import frame_facing, transform
 from tests.samples.synthetic_press import PRESSES

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.particle import CANDIDATES, Particles, particle_filter
 from experiments.contact_localization.posterior.search import Search
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.geometry import translation
 from tests.samples.synthetic_press import PRESSES
 

@@ -5,7 +5,7 @@ import pytest
 
 from experiments.contact_localization.accuracy.budget import places_left
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.hypotheses import Contact
+from experiments.contact_localization.touch.touch import Contact
 from harness.recording.observation import Observation
 
 NO_IMAGE = np.zeros((1, 4, 4, 3), dtype=np.uint8)

@@ -9,10 +9,11 @@ from scipy.ndimage import gaussian_filter
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.baselines import without_images
 from experiments.contact_localization.posterior.estimate import SOUND_LEFT_OUT, Estimate, locate
-from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses
+from experiments.contact_localization.posterior.hypotheses import Hypotheses
 from experiments.contact_localization.posterior.noise import Noise, SharedNoise
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.sound.evidence import StrikeEvidence
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.nearest import nearest_point
 from harness.basics.geometry import rotation_about, rotation_from_vector, translation

@@ -17,9 +17,10 @@ from experiments.contact_localization.posterior.estimate import (
     locate,
     strain_of,
 )
-from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses
+from experiments.contact_localization.posterior.hypotheses import Hypotheses
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.search import Search
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.errors import FitRefused
 from harness.bench.bench_errors import USUAL
 from harness.effects.accuracy import Accuracy

@@ -15,9 +15,9 @@ from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.estimate import Estimate, locate
-from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.report.result import estimate_of, flags_of
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.errors import RecordingDamaged
 from harness.basics.geometry import translation
 from harness.basics.symmetry import SymmetryGroup, find_symmetries

@@ -14,9 +14,9 @@ from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import locate
-from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.report.sound_report import contact_time, sound_of, strike_line
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import frame_facing, transform
 from harness.basics.materials import MATERIALS

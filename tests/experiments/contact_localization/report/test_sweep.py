@@ -11,9 +11,9 @@ from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import METHOD, PARTICLES, ROUNDS, SPACING
 from experiments.contact_localization.posterior.estimate import locate
-from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.report.report import LEVELS, object_from_gels, trade
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray
 from harness.recording.observation import Observation
 from harness.sim.optics.optics import Optics

@@ -16,10 +16,10 @@ from experiments.contact_localization.posterior.baselines import (
     mfcc,
     mfcc_filter,
 )
-from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.sound.gains import gain_table
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import frame_facing, transform

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import find_peaks
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, anchors
+from experiments.contact_localization.posterior.hypotheses import Hypotheses, anchors
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.posterior import best_point
 from experiments.contact_localization.posterior.search import MOST_HYPOTHESES, Search
@@ -22,6 +22,7 @@ from experiments.contact_localization.sound.evidence import (
 )
 from experiments.contact_localization.sound.gains import gain_table
 from experiments.contact_localization.sound.likelihood import SoundNoise, SoundTerm
+from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, rotation_about, transform
 from harness.basics.materials import Material
