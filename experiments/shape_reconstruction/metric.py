@@ -2,7 +2,7 @@
 
 The main number goes from samples to surfaces, each sample to the nearest place of the other's triangles, and
 is zero for the truth itself. The published form goes from points to points and is not: two samplings of one
-surface are some millimetres apart (``published_floor``).
+surface are some millimetres apart (``published_floor``). ``band_held`` tests the stated deviation.
 """
 
 from dataclasses import dataclass
@@ -10,8 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused, OutOfDomain
+from harness.basics.faces.nearest_kernels import shares_on_faces
 from harness.basics.faces.nearest_surface import NearestSurface
 from harness.basics.mesh import Mesh
 from harness.sim.solid.surface_samples import random_points
@@ -74,6 +76,19 @@ class SurfacesApart:
     def error(self) -> ShapeError:
         """How far apart they are."""
         return _summed(self.towards_truth, self.towards_answer, None)
+
+
+@dataclass(frozen=True)
+class BandHeld:
+    """Shares, 0 to 1 and even by area, that are no farther off than the estimate's 90 % band says.
+
+    Attributes:
+        truth: of the true surface, by the band at the estimate's place nearest to each part of it.
+        answer: of the estimate's own surface, by the band there.
+    """
+
+    truth: float
+    answer: float
 
 
 def surfaces_apart(answer: Mesh, truth: Mesh, samples: int = SAMPLES, seed: int = 0) -> SurfacesApart:
@@ -216,3 +231,28 @@ def _require_points(points: FloatArray) -> None:
             f"points of shape {points.shape} are no answer; give (n, 3) finite numbers in metres, one row or "
             "more"
         )
+
+
+BAND90 = 1.645
+"""Standard deviations on each side that hold 90 % of a normal density."""
+
+
+def band_held(estimate: ShapeEstimate, apart: SurfacesApart) -> BandHeld:
+    """How much of both surfaces the band holds; nine tenths where the deviations are honest.
+
+    Args:
+        estimate: states a deviation of each vertex; between them it is interpolated.
+        apart: the same estimate's mesh against the truth.
+    """
+    at_truth = _deviation(estimate, apart.nearest, apart.nearest_faces)
+    at_answer = _deviation(estimate, apart.answer, apart.answer_faces)
+    return BandHeld(
+        truth=float((apart.towards_answer <= BAND90 * at_truth).mean()),
+        answer=float((apart.towards_truth <= BAND90 * at_answer).mean()),
+    )
+
+
+def _deviation(estimate: ShapeEstimate, places: FloatArray, faces: IntArray) -> FloatArray:
+    """``(n,)`` m at ``(n, 3)`` places on faces."""
+    shares = shares_on_faces(places, estimate.mesh.corners, faces)
+    return np.asarray(np.einsum("ij,ij->i", shares, estimate.deviation[estimate.mesh.faces[faces]]))

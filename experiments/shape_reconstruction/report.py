@@ -7,11 +7,10 @@ import numpy as np
 
 from experiments.shape_reconstruction.answer import ShapeAnswer
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.live import LiveEstimate, live_estimates, live_method
-from experiments.shape_reconstruction.metric import shape_error, surfaces_apart
+from experiments.shape_reconstruction.metric import band_held, shape_error, surfaces_apart
 from experiments.shape_reconstruction.result import stem_of, true_surface
+from experiments.shape_reconstruction.running import LiveEstimate, live_estimates, live_method
 from experiments.shape_reconstruction.section import ShapeRun
-from experiments.shape_reconstruction.stated_band import band_held
 from experiments.shape_reconstruction.surface import SEEN, TOUCHED, ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh

@@ -11,6 +11,7 @@ from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.methods import POINTS, estimated, pointed
 from experiments.shape_reconstruction.metric import (
     ShapeError,
+    band_held,
     points_error,
     published_chamfer,
     published_floor,
@@ -19,7 +20,6 @@ from experiments.shape_reconstruction.metric import (
 )
 from experiments.shape_reconstruction.pcn.paper.network import SENSES, PaperCompletion
 from experiments.shape_reconstruction.section import MOST_PRESSES
-from experiments.shape_reconstruction.stated_band import band_held
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.clock import now
 from harness.basics.errors import FitRefused

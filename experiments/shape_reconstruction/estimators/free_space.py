@@ -1,4 +1,4 @@
-"""Where the object is not: behind the gel's face at each touch, along its way, beside the silhouette."""
+"""Free space: behind the gel's face at each touch, along the sensor's path, and outside the silhouette."""
 
 from dataclasses import dataclass
 
@@ -110,3 +110,15 @@ def _best_shift(silhouette: Silhouette, contacts: FloatArray) -> FloatArray:
     beyond = (np.maximum(outside, 0.0) / _CONTACT_BEYOND) ** 2
     cost = beyond.sum(axis=1) + ((shifts / sigma) ** 2).sum(axis=1)
     return np.asarray(shifts[int(cost.argmin())])
+
+
+LEAST = 12
+"""Pixels that an object must cover to be seen."""
+
+
+def silhouette_of(evidence: ShapeEvidence, contacts: FloatArray) -> Silhouette | None:
+    """The silhouette, shifted so that ``(n, 3)`` m of contacts are within it; None where nothing was seen."""
+    look = evidence.look
+    if look is None or int(look.mask.sum()) < LEAST or bool(look.mask.all()):
+        return None
+    return Silhouette.of(look, contacts)

@@ -1,19 +1,35 @@
-"""A box of cells that holds all the space in which an object may be."""
+"""Extract one connected body from a signed distance on a grid of cubic cells."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
+from scipy.spatial import cKDTree
+from skimage.graph import MCP_Geometric
 
-from experiments.shape_reconstruction.estimators.one_body import BodySurface, extract_body
-from harness.basics.arrays import FloatArray
+from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.basics.faces.isosurface import isosurface
+from harness.basics.mesh import Mesh
 
 MOST_CORNERS = 200_000
 """Of a grid: beyond it the cells are made larger."""
 
 BAND = 3.0
 """Pitches from zero, within which every corner is asked."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodySurface:
+    """A closed surface of one piece.
+
+    Attributes:
+        mesh: the surface, m.
+        notes: what was joined or removed, in short sentences; none where the field held one body.
+    """
+
+    mesh: Mesh
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,3 +92,106 @@ class Grid:
             OutOfDomain: as ``isosurface``.
         """
         return extract_body(field.reshape(self.shape), self.origin, self.pitch, contacts)
+
+
+INSIDE = 2.0e-3
+"""Cells below zero from which a corner is inside: twice the clearance that the surface extraction keeps."""
+
+ON_PIECE = 3.0
+"""Cells between a contact and the piece that it belongs to, at most."""
+
+LARGE = 0.2
+"""Volume of a piece, relative to the main piece, from which it is joined although no contact lies on it."""
+
+_BRIDGE = 0.4
+"""Cells that the corners of a bridge are inside."""
+
+_STEP = 0.05
+"""Cost of a step through the body itself, relative to one cell of distance outside it."""
+
+
+def extract_body(
+    field: FloatArray, origin: FloatArray, pitch: float, contacts: FloatArray | None = None
+) -> BodySurface:
+    """Extract the zero surface of a field as one body without cavities.
+
+    The main piece is the one that most contacts lie on, or the largest where none do. Pieces that carry
+    contacts or are large are joined to it along the path on which the field is lowest; the others are
+    removed.
+
+    Args:
+        field: ``(a, b, c)`` signed distance at the corners of a grid, m; negative inside.
+        origin: ``(3,)`` position of the first corner, m.
+        pitch: distance between corners, m.
+        contacts: ``(n, 3)`` points of the surface that were touched, m; None without any.
+
+    Raises:
+        OutOfDomain: as ``isosurface``.
+    """
+    inside = field < -INSIDE * pitch
+    found, count = ndimage.label(inside)
+    labels: IntArray = found.astype(np.int64)
+    notes: tuple[str, ...] = ()
+    if count > 1:
+        on_piece = _count_contacts(labels, count, origin, pitch, contacts)
+        field, notes = _join(field, pitch, labels, on_piece)
+        inside = field < -INSIDE * pitch
+    cavity = _fill(inside) & ~inside
+    if cavity.any():
+        field = np.where(cavity, -_BRIDGE * pitch, field)
+    # Corners too near to zero to be counted as inside must not become pieces of their own.
+    field = np.where(inside | cavity, field, np.maximum(field, INSIDE * pitch))
+    return BodySurface(isosurface(field, origin, pitch), notes)
+
+
+def _count_contacts(
+    labels: IntArray, count: int, origin: FloatArray, pitch: float, contacts: FloatArray | None
+) -> IntArray:
+    """``(count + 1,)`` number of contact points that lie on each piece, by its label."""
+    found = np.zeros(count + 1, np.int64)
+    if contacts is None or len(contacts) == 0:
+        return found
+    corners = np.argwhere(labels > 0)
+    apart, nearest = cKDTree(corners).query((contacts - origin) / pitch, distance_upper_bound=ON_PIECE)
+    near = np.asarray(nearest)[np.isfinite(apart)]
+    np.add.at(found, labels[tuple(corners[near].T)], 1)
+    return found
+
+
+def _join(
+    field: FloatArray, pitch: float, labels: IntArray, on_piece: IntArray
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """The field with its pieces joined or removed, and the sentence that reports it."""
+    volumes = np.bincount(labels.ravel())
+    volumes[0] = 0
+    main = int(np.lexsort((volumes, on_piece))[-1])
+    wanted = (on_piece > 0) | (volumes >= LARGE * volumes[main])
+    wanted[[0, main]] = False
+    removed = ~wanted
+    removed[[0, main]] = False
+    field = np.where(removed[labels], np.maximum(np.abs(field), pitch), field)
+    body = labels == main
+    for piece in np.flatnonzero(wanted):
+        bridge = _bridge(field / pitch, body, labels == piece)
+        field = np.where(bridge, np.minimum(field, -_BRIDGE * pitch), field)
+        body = body | bridge | (labels == piece)
+    joined, gone = int(wanted.sum()), int(removed.sum())
+    note = f"the surface was in {joined + gone + 1} pieces: {joined} joined to the main one, {gone} removed"
+    return field, (note,)
+
+
+def _bridge(cells: FloatArray, body: BoolArray, piece: BoolArray) -> BoolArray:
+    """Corners of a bar three cells thick between two pieces, where the field is lowest between them."""
+    costs = MCP_Geometric(_STEP + np.maximum(cells, 0.0))
+    ends = np.argwhere(piece)
+    total, _ = costs.find_costs(np.argwhere(body), ends, find_all_ends=False)
+    end = ends[int(np.argmin(total[tuple(ends.T)]))]
+    path = np.zeros(cells.shape, bool)
+    path[tuple(np.array(costs.traceback(tuple(int(k) for k in end))).T)] = True
+    return np.asarray(ndimage.binary_dilation(path, np.ones((3, 3, 3), bool)))
+
+
+def _fill(inside: BoolArray) -> BoolArray:
+    """The corners inside, and those that no path of corners outside leads to."""
+    padded = np.pad(inside, 1, constant_values=False)
+    return np.asarray(ndimage.binary_fill_holes(padded)[1:-1, 1:-1, 1:-1])

@@ -1,14 +1,24 @@
-"""The surface through all contacts with their normals: what a body of no kind in particular would be."""
+"""Fit a smooth surface through all contacts with their normals (thin-plate RBF).
+
+Rays along the border of a silhouette add places of the surface; contacts left out give its prediction error.
+"""
 
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import ndimage
+from scipy.linalg import cho_solve
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from experiments.shape_reconstruction.estimators.contact_samples import ContactSamples, all_samples, thinned
-from experiments.shape_reconstruction.estimators.free_space import CLEARANCE, Silhouette, sensor_depth
+from experiments.shape_reconstruction.estimators.free_space import (
+    CLEARANCE,
+    Silhouette,
+    sensor_depth,
+    silhouette_of,
+)
 from experiments.shape_reconstruction.estimators.grid import Grid
 from experiments.shape_reconstruction.estimators.knowledge import (
     beyond_deviation,
@@ -17,12 +27,14 @@ from experiments.shape_reconstruction.estimators.knowledge import (
     limited_sides,
     not_bounded,
 )
-from experiments.shape_reconstruction.estimators.leave_out import LeftOut, predict_by_field
-from experiments.shape_reconstruction.estimators.picture import silhouette_of
-from experiments.shape_reconstruction.estimators.revolution import Revolution, find_revolution
-from experiments.shape_reconstruction.estimators.silhouette_rim import rim_data
+from experiments.shape_reconstruction.estimators.revolution import (
+    SLACK,
+    Revolution,
+    TurnedRoom,
+    find_revolution,
+    turned_room,
+)
 from experiments.shape_reconstruction.estimators.thin_plate import SurfaceData, ThinPlateField, fitted
-from experiments.shape_reconstruction.estimators.turned_room import SLACK, TurnedRoom, turned_room
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
@@ -118,6 +130,21 @@ def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> ShapeEstimate
     body = grid.surface(grid.near_zero(_cut(field, bounds)), samples.points)
     found = _finished(_Fit(evidence, whole, silhouette, field, axis, left_out), body.mesh, start)
     return replace(found, flags=(*found.flags, *body.notes))
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """Predictions of left-out contacts by the field.
+
+    Attributes:
+        errors: ``(contacts,)`` rms distance of each from the field fitted without it, m; zero where thinning
+            kept no point of it.
+        outliers: distance by the index of the touch, m, of those more than ``DOUBTFUL`` standard deviations
+            off.
+    """
+
+    errors: FloatArray
+    outliers: dict[int, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,3 +255,118 @@ def _deviations(field: ThinPlateField, mesh: Mesh) -> FloatArray:
     apart, near = (np.asarray(one) for one in cKDTree(mesh.vertices[some]).query(mesh.vertices, k=[1, 2, 3]))
     share = 1.0 / (apart + 1e-6)
     return np.asarray((share * found[near]).sum(axis=1) / share.sum(axis=1))
+
+
+RAYS = 60
+"""Along the whole border, evenly."""
+
+SIGMA = 2.5e-3
+"""M, one standard deviation of such a place along its normal: pixels, what is left of the camera's errors."""
+
+NORMAL_SIGMA = 0.3
+APART = 10.0e-3
+"""M from any contact, within which the contact knows better."""
+
+_DEPTHS = 40
+
+
+def rim_data(
+    silhouette: Silhouette,
+    field: Callable[[FloatArray], FloatArray],
+    contacts: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+) -> SurfaceData:
+    """Where a field comes nearest to the rays of the border, as data of the surface.
+
+    Args:
+        silhouette: of the picture.
+        field: m at ``(n, 3)`` m, below zero inside.
+        contacts: ``(n, 3)`` m.
+        low: ``(3,)`` m, of the box in which the object is.
+        high: ``(3,)`` m.
+    """
+    pixels, outward = _border(silhouette)
+    pose = silhouette.look.stand_from_camera
+    origin = pose[:3, 3]
+    middle = 0.5 * np.array(silhouette.look.mask.shape[::-1])
+    in_camera = (pixels - middle - silhouette.shift) / silhouette.look.focal_length
+    rays = np.column_stack([in_camera, np.ones(len(in_camera))]) @ pose[:3, :3].T
+    corners = np.array([[low, high][k][i] for k in (0, 1) for i in range(3)]).reshape(2, 3)
+    nearest, farthest = _depths(corners, origin, pose[:3, 2])
+    depths = np.linspace(nearest, farthest, _DEPTHS)
+    along = origin + depths[None, :, None] * rays[:, None]
+    inside = ((along >= low) & (along <= high)).all(axis=2)
+    values = np.where(inside, field(along.reshape(-1, 3)).reshape(inside.shape), np.inf)
+    best = values.argmin(axis=1)
+    places = along[np.arange(len(along)), best]
+    normals = np.column_stack([outward, np.zeros(len(outward))]) @ pose[:3, :3].T
+    kept = np.isfinite(values.min(axis=1))
+    if len(contacts):
+        kept &= cKDTree(contacts).query(places)[0] > APART
+    count = int(kept.sum())
+    return SurfaceData(
+        places[kept], np.zeros(count), np.full(count, SIGMA), normals[kept], np.full(count, NORMAL_SIGMA)
+    )
+
+
+def _border(silhouette: Silhouette) -> tuple[FloatArray, FloatArray]:
+    """``(n, 2)`` pixels of the mask's border that nothing may hide, and the direction out of the mask."""
+    mask, hidden = silhouette.look.mask, silhouette.look.hidden
+    rim = mask & ~ndimage.binary_erosion(mask) & ~ndimage.binary_dilation(hidden, iterations=2)
+    rim[[0, -1]], rim[:, [0, -1]] = False, False  # there the picture ends, not the object
+    rows, columns = np.nonzero(rim)
+    if len(rows) == 0:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    slope = [ndimage.gaussian_filter(silhouette.outside, 1.5, order=order) for order in ((0, 1), (1, 0))]
+    outward = np.column_stack([axis[rows, columns] for axis in slope])
+    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-9)
+    around = np.argsort(np.arctan2(rows - rows.mean(), columns - columns.mean()))
+    some = around[np.unique(np.linspace(0, len(around) - 1, RAYS).astype(int))]
+    return np.column_stack([columns + 0.5, rows + 0.5])[some], outward[some]
+
+
+def _depths(corners: FloatArray, origin: FloatArray, axis: FloatArray) -> tuple[float, float]:
+    """M along the optical axis between which the box with two such corners is."""
+    picked = np.array(
+        [[corners[i, 0], corners[j, 1], corners[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+    )
+    along = (picked - origin) @ axis
+    return float(along.min()), float(along.max())
+
+
+DOUBTFUL = 4.0
+"""Standard deviations between a contact and its prediction above which it is an outlier."""
+
+_SAME_PLACE = 1e-12
+
+
+def predict_by_field(evidence: ShapeEvidence, field: ThinPlateField) -> LeftOut:
+    """Predict each contact from the field without it.
+
+    With ``P`` the inverse of the covariance, a block left out is off by ``inv(P_bb) (P y)_b``, with the
+    covariance ``inv(P_bb)`` (Rasmussen and Williams, Gaussian processes for machine learning, 2006,
+    section 5.4.2).
+    """
+    count = 4 * len(field.data.points)
+    inverse = cho_solve((field.factor, True), np.eye(count), check_finite=False)
+    errors, found = np.zeros(len(evidence.contacts)), {}
+    for k, contact in enumerate(evidence.contacts):
+        rows = _rows_of(contact.points, field)
+        if len(rows) == 0:
+            continue
+        block = np.linalg.inv(inverse[np.ix_(rows, rows)])
+        off = block @ field.weights.ravel()[rows]
+        values = slice(0, None, 4)
+        errors[k] = field.reach * float(np.sqrt(np.mean(off[values] ** 2)))
+        mean = float(off[values].mean())
+        sigma = float(np.sqrt(block[values, values].mean()))
+        if abs(mean) > DOUBTFUL * sigma:
+            found[contact.index] = abs(mean) * field.reach
+    return LeftOut(errors, found)
+
+
+def _rows_of(points: FloatArray, field: ThinPlateField) -> list[int]:
+    """Numbers of the values and gradients that are a contact's."""
+    apart = ((field.data.points[:, None] - points[None]) ** 2).sum(axis=2).min(axis=1)
+    return [4 * int(k) + i for k in np.nonzero(apart < _SAME_PLACE)[0] for i in range(4)]

@@ -7,9 +7,8 @@ import numpy as np
 from scipy.spatial import QhullError
 
 from experiments.shape_reconstruction.estimators.contact_samples import all_samples
-from experiments.shape_reconstruction.estimators.free_space import Silhouette, sensor_depth
+from experiments.shape_reconstruction.estimators.free_space import Silhouette, sensor_depth, silhouette_of
 from experiments.shape_reconstruction.estimators.grid import Grid
-from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.estimators.plain_answer import plain_answer
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.surface import ShapeEstimate

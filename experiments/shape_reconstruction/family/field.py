@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from experiments.shape_reconstruction.estimators.one_body import BodySurface, extract_body
+from experiments.shape_reconstruction.estimators.grid import BodySurface, extract_body
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.distance import BOX, PREPARED, distance, prepare
 from experiments.shape_reconstruction.family.layout import FLOOR, HOLLOW, KIND, TURNED, WALL

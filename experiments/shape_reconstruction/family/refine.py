@@ -5,8 +5,14 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.shape_reconstruction.family.observed import FamilyEvidence
-from experiments.shape_reconstruction.family.residuals import Rows, evaluate, prepared_room, rows_for
-from experiments.shape_reconstruction.family.slopes import active_rows, slopes_along
+from experiments.shape_reconstruction.family.residuals import (
+    Rows,
+    active_rows,
+    evaluate,
+    prepared_room,
+    rows_for,
+    slopes_along,
+)
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
 

@@ -9,21 +9,39 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.shape_reconstruction.family.contacts.housing import housing_row
-from experiments.shape_reconstruction.family.contacts.rows import (
+from experiments.shape_reconstruction.family.contact_rows import (
     clear_row,
     contact_row_count,
     contacts_off,
+    held_housing_row,
+    housing_row,
+    moved_by_gel,
     normal_rows,
     point_row,
     weigh_contacts,
 )
 from experiments.shape_reconstruction.family.distance import PREPARED, ball, distance, inside_depth, prepare
-from experiments.shape_reconstruction.family.layout import CAMERA_DOWN, CAMERA_RIGHT
-from experiments.shape_reconstruction.family.observed import FamilyEvidence
-from experiments.shape_reconstruction.family.ray_depth import nearest_along
-from experiments.shape_reconstruction.family.ray_rows import ray_origin, sighted, turned_ray
-from experiments.shape_reconstruction.family.sight import MEET
+from experiments.shape_reconstruction.family.layout import (
+    CAMERA_DOWN,
+    CAMERA_RIGHT,
+    CAMERA_SCALE,
+    GEL,
+    LIFT,
+    OUTLINE,
+    SIZE,
+    X,
+    Y,
+)
+from experiments.shape_reconstruction.family.observed import GRAZE, MEET, FamilyEvidence
+from experiments.shape_reconstruction.family.rays import (
+    held_distance,
+    hold_ray,
+    nearest_along,
+    ray_origin,
+    ray_sigma,
+    sighted,
+    turned_ray,
+)
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled, inlined
 
@@ -188,3 +206,195 @@ def rows_for(seen: FamilyEvidence) -> Rows:
 def prepared_room() -> FloatArray:
     """Room for a shape's prepared numbers."""
     return np.empty(PREPARED)
+
+
+NUDGE = 1.0e-5
+"""Of a direction, over which a difference is taken: m, rad or logarithm."""
+
+_MOVES = (X, Y, LIFT)
+"""The body's three moves along the axes of ``stand``."""
+
+_CARRIED = (*_MOVES, CAMERA_RIGHT, CAMERA_DOWN, OUTLINE, GEL, GEL + 1, GEL + 2)
+"""Numbers whose derivatives follow from those three."""
+
+
+@compiled
+def slopes_along(
+    code: IntArray,
+    theta: FloatArray,
+    seen: FamilyEvidence,
+    basis: FloatArray,
+    active: IntArray,
+    out: Rows,
+    q: FloatArray,
+) -> FloatArray:
+    """``(n, active)`` derivatives of some rows along directions.
+
+    Args:
+        code: of the shape.
+        theta: ``(SIZE,)``.
+        seen: readings.
+        basis: ``(n, SIZE)``.
+        active: rows, ascending, of all points and of others.
+        out: as ``evaluate`` leaves it there; where rays are held is filled in.
+        q: room.
+    """
+    base, here, moves = np.empty(len(active)), np.empty(len(active)), np.empty((3, len(active)))
+    hold_rays(code, theta, seen, active, out, q)
+    frozen(code, theta, seen, active, out, False, q, base)
+    for k in range(3):
+        towards = np.zeros(SIZE)
+        towards[_MOVES[k]] = NUDGE
+        frozen(code, theta + towards, seen, active, out, False, q, here)
+        moves[k] = (here - base) / NUDGE
+    slopes = np.empty((len(basis), len(active)))
+    for i in range(len(basis)):
+        rest, slopes[i] = basis[i].copy(), 0.0
+        for slot in _CARRIED:
+            rest[slot] = 0.0
+        if (rest != basis[i]).any():
+            _carried(seen, active, moves, basis[i], slopes[i])
+        if rest.any():
+            # The picture's scale changes no row of touch.
+            scale = rest[CAMERA_SCALE] != 0.0 and np.count_nonzero(rest) == 1
+            here[:] = base
+            frozen(code, theta + NUDGE * rest, seen, active, out, scale, q, here)
+            slopes[i] += (here - base) / NUDGE
+    return slopes
+
+
+@compiled
+def _carried(
+    seen: FamilyEvidence, active: IntArray, moves: FloatArray, direction: FloatArray, out: FloatArray
+) -> None:
+    """Fill in what a direction's moves of body, gel and camera, and of the outline, change of some rows.
+
+    Args:
+        seen: readings.
+        active: rows.
+        moves: ``(3, active)`` their derivatives by the body's moves.
+        direction: ``(SIZE,)``.
+        out: ``(active,)``.
+    """
+    faces = contact_row_count(seen)
+    free, ray, supposed = faces + len(seen.faces), first_ray(seen), first_supposed(seen)
+    right, down, nowhere = direction[CAMERA_RIGHT], direction[CAMERA_DOWN], np.zeros(3)
+    seen_off = right * seen.rays.right + down * seen.rays.down
+    supposed_off = right * seen.supposed_right + down * seen.supposed_down
+    per_outline = direction[OUTLINE] / ray_sigma(seen.rays)
+    for row in range(len(active)):
+        i, x, y, z = active[row], 0.0, 0.0, 0.0
+        if i < faces:
+            x, y, z = moved_by_gel(direction, seen.gel[_contact_of(seen, i)], nowhere)
+        elif i < free:
+            x, y, z = moved_by_gel(direction, seen.face_gel[i - faces], nowhere)
+        elif i >= supposed:
+            x, y, z = supposed_off[0], supposed_off[1], supposed_off[2]
+        elif i >= ray:
+            x, y, z = seen_off[0], seen_off[1], seen_off[2]
+        # What reads there is farther on by that: as if the body were farther back.
+        out[row] = (
+            (direction[X] - x) * moves[0, row]
+            + (direction[Y] - y) * moves[1, row]
+            + (direction[LIFT] - z) * moves[2, row]
+        )
+        if ray <= i < supposed and seen.rays.kinds[i - ray] == GRAZE:
+            out[row] -= per_outline
+
+
+@compiled
+def _contact_of(seen: FamilyEvidence, row: int) -> int:
+    """Which contact one of the contacts' rows is of."""
+    n = len(seen.points)
+    if row < n:
+        return int(seen.touch[row])
+    clear = n + 3 * len(seen.middles)
+    return int((row - n) // 3 if row < clear else seen.clear_touch[row - clear])
+
+
+@compiled
+def hold_rays(
+    code: IntArray, theta: FloatArray, seen: FamilyEvidence, active: IntArray, out: Rows, q: FloatArray
+) -> None:
+    """Fill in where rays are held, ``out.held``, of those that are active."""
+    prepare(code, theta, q)
+    first, rays = first_ray(seen), seen.rays
+    origin, towards = np.empty(3), np.empty(3)
+    ray_origin(theta, rays, origin)
+    for row in active:
+        i = row - first
+        if 0 <= i < len(rays.kinds):
+            turned_ray(theta, rays, i, towards)
+            hold_ray(code, q, origin, towards, out.along[i], rays.step, out.held[i])
+
+
+@compiled
+def frozen(
+    code: IntArray,
+    theta: FloatArray,
+    seen: FamilyEvidence,
+    active: IntArray,
+    held: Rows,
+    of_sight: bool,
+    q: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Fill in the residuals of some rows with rays and housings held in place: what derivatives are taken of.
+
+    Args:
+        code: of the shape.
+        theta: ``(SIZE,)``.
+        seen: readings.
+        active: rows, ascending.
+        held: where, as ``evaluate`` and ``hold_rays`` leave it.
+        of_sight: whether only rays, and what is supposed by the picture, are filled in.
+        q: room.
+        out: ``(active,)``.
+    """
+    prepare(code, theta, q)
+    n, first, ray = len(seen.points), contact_row_count(seen), first_ray(seen)
+    clear, free, rays = n + 3 * len(seen.middles), first + len(seen.faces), seen.rays
+    towards, origin, triple, last = np.empty(3), np.empty(3), np.empty(3), -1
+    ray_origin(theta, rays, origin)
+    off = np.empty(0)
+    for row in range(len(active)):
+        i = active[row]
+        if of_sight and i < ray:
+            continue
+        if i < n:
+            out[row] = point_row(code, theta, seen, q, i)
+        elif i < clear:
+            j = (i - n) // 3
+            if j != last:
+                normal_rows(code, theta, seen, q, j, triple)
+                last = j
+            out[row] = triple[(i - n) % 3]
+        elif i < first:
+            if not len(off):
+                off = contacts_off(seen, out)  # all points are active: their rows are the first
+            out[row] = clear_row(code, theta, seen, q, off, i - clear)
+        elif i < free:
+            out[row] = held_housing_row(code, theta, seen, q, i - first, held.met[i - first])
+        elif i < ray:
+            out[row] = free_row(code, seen, q, i - free)
+        elif i >= first_supposed(seen):
+            out[row] = supposed_row(code, theta, seen, q, i - first_supposed(seen))
+        else:
+            i -= ray
+            turned_ray(theta, rays, i, towards)
+            d = held_distance(code, q, origin, towards, held.held[i])
+            out[row] = sighted(theta, rays, i, d)
+
+
+@compiled
+def active_rows(seen: FamilyEvidence, values: FloatArray) -> IntArray:
+    """Rows that pull: of points, normals, housings and grazing rays all, of the others those not zero."""
+    first, end = len(seen.points) + 3 * len(seen.middles), first_supposed(seen)
+    rays = first_ray(seen)
+    found = np.empty(len(values), np.int64)
+    count = 0
+    for i in range(len(values)):
+        if i < first or values[i] != 0.0 or (rays <= i < end and seen.rays.kinds[i - rays] == GRAZE):
+            found[count] = i
+            count += 1
+    return found[:count]

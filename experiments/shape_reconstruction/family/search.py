@@ -7,24 +7,29 @@ import numpy as np
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import CLASSES, FamilyShape, codes_of, draw_shape, rarity
+from experiments.shape_reconstruction.family.classes import (
+    CLASSES,
+    FamilyShape,
+    codes_of,
+    draw_shape,
+    rarity,
+    rarity_of_size,
+)
 from experiments.shape_reconstruction.family.freedom import (
     OUTLINE_BIAS,
+    Strain,
     basis_of,
     bench_rows,
     shape_rows,
     stand_basis,
     stand_rows,
+    strain_of,
 )
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
-from experiments.shape_reconstruction.family.proposing.changes import beside, changes
-from experiments.shape_reconstruction.family.proposing.guides import Guides, guides_of
-from experiments.shape_reconstruction.family.proposing.proposals import lay
+from experiments.shape_reconstruction.family.proposals import Guides, beside, changes, guides_of, lay
 from experiments.shape_reconstruction.family.refine import PriorRows, cheapest, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import prepared_room, rows_for
 from experiments.shape_reconstruction.family.settings import FamilySettings
-from experiments.shape_reconstruction.family.sizes import rarity_of_size
-from experiments.shape_reconstruction.family.strain import Strain, strain_of
 from harness.basics.arrays import FloatArray
 
 _Random = np.random.Generator

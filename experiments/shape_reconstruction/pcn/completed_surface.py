@@ -8,14 +8,13 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from experiments.shape_reconstruction.estimators.contact_samples import all_samples
-from experiments.shape_reconstruction.estimators.grid import Grid
+from experiments.shape_reconstruction.estimators.grid import BodySurface, Grid
 from experiments.shape_reconstruction.estimators.knowledge import (
     beyond_deviation,
     known_by,
     limited_sides,
     not_bounded,
 )
-from experiments.shape_reconstruction.estimators.one_body import BodySurface
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.pcn.network import shipped
 from experiments.shape_reconstruction.surface import ShapeEstimate

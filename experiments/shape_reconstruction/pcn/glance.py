@@ -8,8 +8,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from experiments.shape_reconstruction.estimators.free_space import Silhouette
-from experiments.shape_reconstruction.estimators.picture import silhouette_of
+from experiments.shape_reconstruction.estimators.free_space import Silhouette, silhouette_of
 from experiments.shape_reconstruction.estimators.point_answer import PointEstimate
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.pcn.card import held_out_error

@@ -8,13 +8,13 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial.distance import cdist
 
 from experiments.shape_reconstruction.estimators.contact_samples import ContactSamples, all_samples, thinned
+from experiments.shape_reconstruction.estimators.free_space import silhouette_of
 from experiments.shape_reconstruction.estimators.knowledge import (
     beyond_deviation,
     known_by,
     limited_sides,
     not_bounded,
 )
-from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.retrieval.library import LibraryShape
 from experiments.shape_reconstruction.retrieval.placing import PlacedShape, placed

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction.choosing import (
+    BEYOND,
     blindly,
     farthest,
+    lines_at_surface,
     meeting_places,
 )
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
-from experiments.shape_reconstruction.lines import BEYOND, lines_at_surface
 from experiments.shape_reconstruction.surface import SUPPOSED, ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, transform, translation

@@ -5,12 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from experiments.shape_reconstruction.choosing import farthest, most_informative
+from experiments.shape_reconstruction.choosing import (
+    distances_apart,
+    error_spared,
+    farthest,
+    most_informative,
+    readings_on,
+)
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.expected_error import distances_apart, error_spared, readings_on
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape, draw_shape
-from experiments.shape_reconstruction.family.ray_depth import first_met
+from experiments.shape_reconstruction.family.rays import first_met
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh

@@ -1,6 +1,5 @@
 """Files of an answer read back as what was written, by a reader that is not ours."""
 
-import io
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,8 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from experiments.shape_reconstruction.estimators.point_answer import PointEstimate
-from experiments.shape_reconstruction.files import PALE_AT, colours_of, write_estimate, write_points
+from experiments.shape_reconstruction.result import PALE_AT, colours_of, write_estimate
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import DataRefused
 from harness.objects.builtin import build
@@ -95,13 +93,6 @@ def test_colours_go_from_known_to_unknown_and_stop_there() -> None:
     assert colours[0, 2] > colours[0, 0]
     assert np.array_equal(colours[2], colours[3])
     assert colours[3, 0] > colours[3, 2]
-
-
-def test_an_answer_in_points_is_written_as_points(tmp_path: Path) -> None:
-    points = np.random.default_rng(0).normal(size=(7, 3))
-    write_points(PointEstimate(points, 0.0), tmp_path / "points.npz")
-    with np.load(io.BytesIO((tmp_path / "points.npz").read_bytes()), allow_pickle=False) as read:
-        assert np.array_equal(read["points"], points)
 
 
 def test_what_is_not_whole_is_not_written(estimate: ShapeEstimate, tmp_path: Path) -> None:

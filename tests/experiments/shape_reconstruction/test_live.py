@@ -9,9 +9,15 @@ from experiments.shape_reconstruction import running
 from experiments.shape_reconstruction.estimators.plain_bodies import by_box
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.settings import FamilySettings
-from experiments.shape_reconstruction.live import MOST, counts_shown, live_estimates, live_method
 from experiments.shape_reconstruction.methods import QUICK
-from experiments.shape_reconstruction.running import INFORMATIVE, RunningShape
+from experiments.shape_reconstruction.running import (
+    INFORMATIVE,
+    MOST,
+    RunningShape,
+    counts_shown,
+    live_estimates,
+    live_method,
+)
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.objects.builtin import build
 from tests.experiments.shape_reconstruction.touched import evidence_of, presses

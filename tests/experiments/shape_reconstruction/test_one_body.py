@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from scipy import ndimage
 
-from experiments.shape_reconstruction.estimators.one_body import extract_body
+from experiments.shape_reconstruction.estimators.grid import extract_body
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.mesh_rays import is_inside
 from harness.basics.mesh import Mesh

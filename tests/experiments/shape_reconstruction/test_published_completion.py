@@ -11,7 +11,7 @@ from scipy.ndimage import binary_fill_holes
 from experiments.shape_reconstruction import table_rows
 from experiments.shape_reconstruction.estimators.contact_samples import all_samples
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.explore import plan
+from experiments.shape_reconstruction.explorer import plan
 from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS
 from experiments.shape_reconstruction.pcn.paper.network import DENSE, SENSES, paper_completions
 from experiments.shape_reconstruction.pcn.point_frame import TAKEN, PointFrame, taken

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from experiments.shape_reconstruction.metric import surfaces_apart
-from experiments.shape_reconstruction.stated_band import BAND90, BandHeld, band_held
+from experiments.shape_reconstruction.metric import BAND90, BandHeld, band_held, surfaces_apart
 from experiments.shape_reconstruction.surface import SUPPOSED, ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh

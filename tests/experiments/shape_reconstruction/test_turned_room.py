@@ -8,8 +8,7 @@ import pytest
 from experiments.shape_reconstruction.estimators.contact_samples import ContactSamples, all_samples
 from experiments.shape_reconstruction.estimators.free_space import sensor_depth
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
-from experiments.shape_reconstruction.estimators.revolution import Revolution
-from experiments.shape_reconstruction.estimators.turned_room import SLACK, turned_room
+from experiments.shape_reconstruction.estimators.revolution import SLACK, Revolution, turned_room
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.mesh_rays import is_inside

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.contacts.fit import ContactFit
+from experiments.shape_reconstruction.family.contact_fit import ContactFit, displacement
 from experiments.shape_reconstruction.family.estimate import (
     BLIND,
     LOOSE,
@@ -19,9 +19,8 @@ from experiments.shape_reconstruction.family.estimate import (
     _outliers,
     family_estimate,
 )
+from experiments.shape_reconstruction.family.freedom import STRAINED
 from experiments.shape_reconstruction.family.settings import LEVELS
-from experiments.shape_reconstruction.family.strain import STRAINED
-from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.metric import shape_error
 from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
 from harness.basics.errors import OutOfDomain

@@ -8,12 +8,17 @@ import pytest
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape
-from experiments.shape_reconstruction.family.contacts.housing import nearest_on_face
-from experiments.shape_reconstruction.family.contacts.rows import contact_row_count
+from experiments.shape_reconstruction.family.contact_rows import contact_row_count, nearest_on_face
 from experiments.shape_reconstruction.family.distance import distances, prepare
 from experiments.shape_reconstruction.family.observed import LOOSELY, MODEL, observe
-from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
-from experiments.shape_reconstruction.family.slopes import active_rows, frozen, hold_rays
+from experiments.shape_reconstruction.family.residuals import (
+    active_rows,
+    evaluate,
+    frozen,
+    hold_rays,
+    prepared_room,
+    rows_for,
+)
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing
 from tests.support.family_readings import ended_at

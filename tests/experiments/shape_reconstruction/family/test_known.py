@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
-from experiments.shape_reconstruction.family.known import SHORT, beyond_contacts, not_bounded
+from experiments.shape_reconstruction.family.estimate import SHORT, beyond_contacts, not_bounded
 from harness.basics.mesh import Mesh
 from tests.support.shape_readings import look_at, shape_readings, touch_at
 

@@ -8,18 +8,16 @@ import pytest
 from experiments.shape_reconstruction.evidence import GuardedTouch
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import SOLID, FamilyShape, draw_shape, rarity
-from experiments.shape_reconstruction.family.contacts.fit import contact_fit
+from experiments.shape_reconstruction.family.contact_fit import contact_fit
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, shape_rows
-from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
+from experiments.shape_reconstruction.family.observed import PASS, FamilyEvidence, observe
 from experiments.shape_reconstruction.family.posterior import mixture_of
-from experiments.shape_reconstruction.family.proposing.guides import guides_of
-from experiments.shape_reconstruction.family.proposing.proposals import lay
+from experiments.shape_reconstruction.family.proposals import guides_of, lay
 from experiments.shape_reconstruction.family.refine import PriorRows, cheapest, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
 from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
-from experiments.shape_reconstruction.family.sight import PASS
 from harness.basics.geometry import apply, transform, translation
 from tests.support.family_readings import made, nudged
 from tests.support.family_shapes import SHAPES

@@ -4,11 +4,16 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import CLASSES, FamilyShape, draw_shape
+from experiments.shape_reconstruction.family.classes import (
+    CLASSES,
+    FamilyShape,
+    draw_shape,
+    rarity_of_size,
+    size_of,
+)
 from experiments.shape_reconstruction.family.freedom import sizes_of
 from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
-from experiments.shape_reconstruction.family.sizes import rarity_of_size, size_of
 from tests.support.family_shapes import surface_of
 from tests.support.shape_readings import look_at, shape_readings, touches_on
 

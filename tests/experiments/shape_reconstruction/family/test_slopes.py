@@ -10,18 +10,22 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.contacts.rows import contact_row_count
+from experiments.shape_reconstruction.family.contact_rows import contact_row_count
 from experiments.shape_reconstruction.family.freedom import basis_of, stand_basis
 from experiments.shape_reconstruction.family.observed import observe
 from experiments.shape_reconstruction.family.residuals import (
+    NUDGE,
+    active_rows,
     evaluate,
     first_ray,
     first_supposed,
+    frozen,
+    hold_rays,
     prepared_room,
     row_count,
     rows_for,
+    slopes_along,
 )
-from experiments.shape_reconstruction.family.slopes import NUDGE, active_rows, frozen, hold_rays, slopes_along
 from tests.support.family_readings import ended_at, made, nudged
 from tests.support.family_shapes import SHAPES
 

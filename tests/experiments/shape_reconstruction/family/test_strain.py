@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.freedom import bench_rows
-from experiments.shape_reconstruction.family.strain import STRAINED, strain_of
+from experiments.shape_reconstruction.family.freedom import STRAINED, bench_rows, strain_of
 
 SUPPORT = 1.0e-3
 ROWS = bench_rows(place=0.02, support=SUPPORT, pixel=1.0e-3, shift=2.0e-3, scale=0.01)

@@ -8,8 +8,8 @@ import pytest
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.estimate import LEFT, LOOSE, RIVAL
+from experiments.shape_reconstruction.family.freedom import STRAINED
 from experiments.shape_reconstruction.family.settings import CONTINUED, FamilySettings
-from experiments.shape_reconstruction.family.strain import STRAINED
 from experiments.shape_reconstruction.fusion import reconstruct as fusion
 from experiments.shape_reconstruction.fusion.acceptance import MAX_OUTLINE_ERROR, MIN_CONTACTS, Candidate
 from experiments.shape_reconstruction.fusion.reconstruct import (

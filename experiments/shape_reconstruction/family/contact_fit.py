@@ -1,0 +1,261 @@
+"""Compare contacts with a fitted shape: residuals, outliers, turned contacts, and moving the surface to them.
+
+A turned contact is one whose pose is rotated against the shape, as a wrong pose of the arm makes it. It is
+moved as a rigid patch: shifted a little along a curved wall it is rotated against the wall as well, so a
+shift may explain a rotation as far as shifts are likely.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial.distance import cdist
+
+from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
+from experiments.shape_reconstruction.family import layout
+from experiments.shape_reconstruction.family.classes import FamilyShape
+from experiments.shape_reconstruction.family.contact_rows import SLIPPED, contact_sums
+from experiments.shape_reconstruction.family.distance import distances
+from experiments.shape_reconstruction.family.observed import FamilyEvidence, farthest_points
+from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
+from harness.basics.arrays import BoolArray, FloatArray
+from harness.basics.geometry import rotation_from_vector
+
+STRANGE = 16.0
+"""A contact's sum of squares, of some five numbers, from which on it may be doubted."""
+
+ALONE = 5.0
+"""By how many times it exceeds the median contact's: where all are off, the shape is, not the contacts."""
+
+LEAST_OFF = 1.0e-3
+"""M that a doubtful contact is off at least: normals at edges differ without being wrong."""
+
+_PROBE = 0.5e-3
+
+
+@dataclass(frozen=True, eq=False)
+class ContactFit:
+    """Of every contact, in their order.
+
+    Attributes:
+        sums: ``(contacts,)`` sums of squares, in standard deviations.
+        off: ``(contacts,)`` m rms between its points and the surface.
+        doubtful: ``(contacts,)`` whether it does not fit while most do.
+        others: cost of free places, of what the gel touched nothing of, and of rays of sight.
+    """
+
+    sums: FloatArray
+    off: FloatArray
+    doubtful: BoolArray
+    others: float
+
+    @property
+    def typical(self) -> float:
+        """Median sum of squares of a contact; zero without any."""
+        return float(np.median(self.sums)) if len(self.sums) else 0.0
+
+
+def contact_fit(shape: FamilyShape, seen: FamilyEvidence) -> ContactFit:
+    """How the contacts fit a shape."""
+    out, q = rows_for(seen), prepared_room()
+    cost = evaluate(shape.code, shape.theta, seen, False, out, q)
+    sums = np.asarray(contact_sums(seen, out.values))
+    count = len(sums)
+    off = np.zeros(count)
+    if count:
+        squares = (out.values[: len(seen.points)] * seen.sigma[seen.touch]) ** 2
+        off = np.sqrt(np.bincount(seen.touch, squares, count) / np.bincount(seen.touch, minlength=count))
+    strange = (sums > STRANGE) & (off > LEAST_OFF)
+    doubtful = strange & (sums > ALONE * np.median(sums)) if count else strange
+    linear = np.sqrt(SLIPPED * sums) - 0.5 * SLIPPED
+    by_contacts = float(np.where(sums <= SLIPPED, 0.5 * sums, linear).sum())
+    return ContactFit(sums, off, doubtful, cost - by_contacts)
+
+
+def moved_points(
+    shape: FamilyShape, evidence: ShapeEvidence, which: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Points of chosen contacts where the run's gel really was, and how far each is off the shape.
+
+    Returns:
+        ``(n, 3)`` m and ``(n, 3)`` m from the shape's surface to each.
+    """
+    gel = shape.theta[layout.GEL : layout.GEL + 3]
+    contacts = [touch for touch, chosen in zip(evidence.contacts, which, strict=True) if chosen]
+    if not contacts:
+        return np.empty((0, 3)), np.empty((0, 3))
+    points = np.concatenate([_few(touch.points) + touch.stand_from_gel[:3, :3] @ gel for touch in contacts])
+    ahead = np.concatenate(
+        [distances(shape.code, shape.theta, points + _PROBE * axis)[:, None] for axis in np.eye(3)], axis=1
+    )
+    behind = np.concatenate(
+        [distances(shape.code, shape.theta, points - _PROBE * axis)[:, None] for axis in np.eye(3)], axis=1
+    )
+    slope = (ahead - behind) / (2.0 * _PROBE)
+    length = np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-6)
+    gap = distances(shape.code, shape.theta, points)
+    return points, gap[:, None] * slope / length
+
+
+def _few(points: FloatArray, count: int = 8) -> FloatArray:
+    return points[:: max(len(points) // count, 1)]
+
+
+POINTS = 12
+"""Of a contact, that are compared."""
+
+INDEPENDENT = 3.0
+"""Points that a contact counts as: its neighbours err together."""
+
+POINT_SIGMA, NORMAL_SIGMA = 0.6e-3, float(np.radians(4.0))
+"""M and rad by which the nearest shape is off a contact whose pose is right."""
+
+SHIFT_SIGMA = (1.0e-3, 1.0e-3, 2.0e-3)
+"""M along x, y and z of the gel that the nearest shape lies beside a real one at a contact."""
+
+TURNED, APART, GAIN = float(np.radians(9.0)), 3.0, 8.0
+"""Rad, times the median contact, and the sum of squares: more than errors of gel and shape explain."""
+
+WIDE, SMOOTH = 1.2e-3, float(np.radians(10.0))
+"""M rms of a contact's points across its narrower side, and rad of its normals about their mean: of a press
+on an edge normals are off by 30 degrees and more at a right pose."""
+
+TILT_SIGMA = float(np.radians(30.0))
+
+OUT, STEP = 1.5e-3, 1.0e-3
+"""M before the surface where a shape's slope is taken, and over which."""
+
+_PRIOR = np.array([*SHIFT_SIGMA, TILT_SIGMA, TILT_SIGMA])
+_STEPS = np.array([1e-4, 1e-4, 1e-4, 1e-2, 1e-2])
+_ROUNDS = 5
+
+
+def turned_contacts(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
+    """``(contacts,)`` rad by which the pose of each contact is turned against a shape; 0 where it is right.
+
+    It is turned where it fits much better turned, by more than ``TURNED`` and thrice as far as the others.
+    Contacts of edges and corners are not judged, and 0.
+    """
+    found = np.zeros(len(evidence.contacts))
+    judged = [k for k, touch in enumerate(evidence.contacts) if _is_face(touch)]
+    if not judged:
+        return found
+    tilts = np.array([_tilt(shape, evidence.contacts[k]) for k in judged])
+    least = max(TURNED, APART * float(np.median(tilts[:, 0])))
+    turned = (tilts[:, 0] > least) & (tilts[:, 1] > GAIN)
+    found[judged] = np.where(turned, tilts[:, 0], 0.0)
+    return found
+
+
+def _is_face(touch: GuardedTouch) -> bool:
+    """Whether it met a smooth piece of surface, wide both ways: an edge has no one normal."""
+    middle = touch.points.mean(axis=0)
+    widths = np.linalg.svd(touch.points - middle, compute_uv=False) / np.sqrt(len(touch.points))
+    spread = np.arccos(np.clip(touch.normals @ touch.mean_normal, -1.0, 1.0))
+    return bool(len(widths) > 1 and widths[1] > WIDE and spread.mean() < SMOOTH)
+
+
+def _tilt(shape: FamilyShape, touch: GuardedTouch) -> tuple[float, float]:
+    """Rad that it is turned to fit best, and by how much its sum of squares is less for that."""
+    patch = _Patch.of(touch, shape.theta[layout.GEL : layout.GEL + 3])
+    _, shifted = _least(shape, patch, 3)
+    moved, turned = _least(shape, patch, 5)
+    return float(np.linalg.norm(moved[3:])), shifted - turned
+
+
+@dataclass(frozen=True, eq=False)
+class _Patch:
+    """Points and their mean normal in the frame of the gel, about their middle, and where that is."""
+
+    points: FloatArray
+    normal: FloatArray
+    turn: FloatArray
+    place: FloatArray
+
+    @classmethod
+    def of(cls, touch: GuardedTouch, gel: FloatArray) -> "_Patch":
+        rows = farthest_points(touch.points, POINTS)
+        turn, place = touch.stand_from_gel[:3, :3], touch.points[rows].mean(axis=0)
+        return cls((touch.points[rows] - place) @ turn, touch.mean_normal @ turn, turn, place + turn @ gel)
+
+    def residuals(self, shape: FamilyShape, moved: FloatArray) -> FloatArray:
+        """``(5 + n + 3,)``: of the move itself, of each point, and of the normal."""
+        about = rotation_from_vector(np.array([moved[3], moved[4], 0.0]))
+        points = (self.points @ about.T + moved[:3]) @ self.turn.T + self.place
+        normal = self.turn @ about @ self.normal
+        share = np.sqrt(INDEPENDENT / len(points))
+        gap = distances(shape.code, shape.theta, points) * share / POINT_SIGMA
+        bent = (_slope(shape, points.mean(axis=0) + OUT * normal) - normal) / NORMAL_SIGMA
+        return np.concatenate([moved / _PRIOR, gap, bent])
+
+
+def _slope(shape: FamilyShape, point: FloatArray) -> FloatArray:
+    steps = STEP * np.concatenate([np.eye(3), -np.eye(3)])
+    around = distances(shape.code, shape.theta, point + steps)
+    return np.asarray((around[:3] - around[3:]) / (2.0 * STEP))
+
+
+def _least(shape: FamilyShape, patch: _Patch, free: int) -> tuple[FloatArray, float]:
+    """The move of least sum of squares with its first ``free`` numbers free (Gauss-Newton), and that sum."""
+    moved = np.zeros(5)
+    rows = patch.residuals(shape, moved)
+    for _ in range(_ROUNDS):
+        slopes = np.array(
+            [patch.residuals(shape, moved + _STEPS[k] * np.eye(5)[k]) - rows for k in range(free)]
+        )
+        slopes /= _STEPS[:free, None]
+        step = np.zeros(5)
+        step[:free] = np.linalg.solve(slopes @ slopes.T, -slopes @ rows)
+        tried = patch.residuals(shape, moved + step)
+        if tried @ tried >= rows @ rows:
+            break
+        moved, rows = moved + step, tried
+    return moved, float(rows @ rows)
+
+
+LENGTH = 15.0e-3
+"""M over which a displacement dies away."""
+
+AMPLITUDE = 3.0e-3
+"""M: one standard deviation of a displacement where nothing was read."""
+
+FAR = 45.0e-3
+"""M over which a shape of the wrong class is off alike."""
+
+
+def displacement(
+    places: FloatArray, offsets: FloatArray, sigma: FloatArray, queries: FloatArray, far: float = 0.0
+) -> FloatArray:
+    """The mean of a Gaussian process of displacements, squared-exponential, each axis by itself.
+
+    A surface is moved by vectors, not along its normals by amounts, so that both sides of a wall go together.
+
+    Args:
+        places: ``(n, 3)`` m.
+        offsets: ``(n, 3)`` m that the surface is displaced by there.
+        sigma: ``(n,)`` m, one standard deviation of those, greater than zero.
+        queries: ``(m, 3)`` m.
+        far: m, one standard deviation of displacements that die away over ``FAR``; none by default.
+
+    Returns:
+        ``(m, 3)`` m; zero far from all places.
+    """
+    if len(places) == 0:
+        return np.zeros_like(queries)
+    covariance = _kernel(places, places, far) + np.diag(sigma**2)
+    weights = cho_solve(cho_factor(covariance, lower=True), offsets)
+    return np.asarray(_kernel(queries, places, far) @ weights)
+
+
+def _kernel(a: FloatArray, b: FloatArray, far: float) -> FloatArray:
+    squares = cdist(a, b, "sqeuclidean")
+    near = _falling(squares, AMPLITUDE, LENGTH)
+    return np.asarray(near + _falling(squares, far, FAR) if far > 0.0 else near)
+
+
+def _falling(squares: FloatArray, amplitude: float, length: float) -> FloatArray:
+    """A squared-exponential covariance at squared distances; made in one array, which is large."""
+    found = squares * (-0.5 / length**2)
+    np.exp(found, out=found)
+    found *= amplitude**2
+    return found

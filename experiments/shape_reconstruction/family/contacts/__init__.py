@@ -1,1 +1,0 @@
-"""Contacts of the gel: how a shape disagrees with them, and which of them do not fit the rest."""

@@ -1,0 +1,374 @@
+"""Propose shapes: draws of the prior placed by the readings, and neighbours of a hypothesis.
+
+A neighbour has a part added, removed or exchanged, or is rotated to a look-alike pose.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.family import layout
+from experiments.shape_reconstruction.family.classes import FamilyShape, add_loop, add_spout, size_of
+from experiments.shape_reconstruction.family.freedom import deviations, has_yaw, sizes_of
+from experiments.shape_reconstruction.family.layout import (
+    CORED,
+    DISC,
+    FLAT_SIDED,
+    KNOTS,
+    LOOP,
+    NO_LIMB,
+    PLAIN,
+    RING,
+    ROUND,
+    SLOT,
+    SUPER,
+    TOOL,
+    TURNED,
+)
+from experiments.shape_reconstruction.family.observed import directions_of
+from harness.basics.arrays import FloatArray
+
+_Random = np.random.Generator
+
+OWN = 0.3
+"""Share of the draws that keep the size that they were drawn with."""
+
+ENOUGH, SPANNED = 6, 0.5
+"""Contacts whose box proposes the sides of a body with straight ones; share of such draws that take them."""
+
+_BEYOND = 0.15
+"""Logarithm by which sides may reach beyond the contacts."""
+
+_MOST_SCALE = 1.6
+
+
+@dataclass(frozen=True, eq=False)
+class Guides:
+    """Proposals that the readings make.
+
+    Attributes:
+        places: ``(contacts, 3)`` m, of the contacts.
+        middles: ``(n, 2)`` m, where the object's middle may be, by its contacts.
+        extents: ``(3,)`` m, of the box around the contacts and the support; zero without contacts.
+        turns: ``(m,)`` rad, ways that its long side or a flat side may look.
+        seen: ``(2,)`` m across and up the picture at a metre's distance, of the silhouette; zero without one.
+        eye: ``(3,)`` m, of the camera.
+        middle_ray: ``(3,)`` unit, towards the middle of the silhouette's box.
+        outline: ``(k, 3)`` unit, towards the silhouette's border; none without one.
+    """
+
+    places: FloatArray
+    middles: FloatArray
+    extents: FloatArray
+    turns: FloatArray
+    seen: FloatArray
+    eye: FloatArray
+    middle_ray: FloatArray
+    outline: FloatArray
+
+    @property
+    def sighted(self) -> bool:
+        """Whether there is a silhouette."""
+        return len(self.outline) > 0
+
+    @property
+    def touched(self) -> bool:
+        """Whether there are contacts."""
+        return len(self.middles) > 0
+
+    def on_level(self, height: float) -> FloatArray:
+        """``(k, 2)`` m: where the border's rays cross a height; those that never do are left out."""
+        down = self.outline[self.outline[:, 2] < -0.05]
+        away = (self.eye[2] - height) / -down[:, 2]
+        return np.asarray(self.eye[:2] + away[:, None] * down[:, :2])
+
+
+def lay(shape: FamilyShape, guides: Guides, random: _Random, place_error: float, yaws: int) -> FloatArray:
+    """Vectors of a draw at a place and in a size of the readings, at several turns.
+
+    Args:
+        shape: about the origin.
+        guides: of the readings.
+        random: choices between what the readings allow.
+        place_error: m, where nothing was read.
+        yaws: turns, one where a turn changes nothing.
+
+    Returns:
+        ``(yaws, SIZE)``.
+    """
+    theta = shape.theta.copy()
+    long = _is_long(shape)
+    turn = long_way(guides.on_level(0.5 * size_of(shape.code, theta)[1])) if guides.sighted and long else None
+    theta[list(sizes_of(shape.code))] += _log_scale(shape, guides, random, turn)
+    theta[layout.X : layout.Y + 1] = _middle(shape, theta, guides, random, place_error, long)
+    count = yaws if has_yaw(shape.code) else 1
+    laid = np.repeat(theta[None], count, axis=0)
+    laid[:, layout.YAW] = _turns(guides, random, turn, count)
+    if shape.code[layout.PLAN] == CORED and len(guides.places) >= ENOUGH and random.random() < SPANNED:
+        for one in laid:
+            _span(one, guides.places, random)
+    return laid
+
+
+def _span(theta: FloatArray, places: FloatArray, random: _Random) -> None:
+    """Give a body with straight sides the sides and the middle of the contacts' box, as it is turned."""
+    cosine, sine = np.cos(theta[layout.YAW]), np.sin(theta[layout.YAW])
+    along = places[:, :2] @ np.array([[cosine, -sine], [sine, cosine]])
+    low, high = along.min(axis=0), along.max(axis=0)
+    half = 0.5 * (high - low) * np.exp(random.uniform(0.0, _BEYOND))
+    middle = 0.5 * (low + high)
+    theta[layout.X] = cosine * middle[0] - sine * middle[1]
+    theta[layout.Y] = sine * middle[0] + cosine * middle[1]
+    corner = float(np.exp(theta[layout.RADII : layout.RADII + KNOTS].max()))
+    theta[[layout.CORE_X, layout.CORE_Y]] = np.log(np.maximum(half - corner, 0.1 * half))
+
+
+def _is_long(shape: FamilyShape) -> bool:
+    return bool(shape.code[layout.KIND] != TURNED)
+
+
+def _log_scale(shape: FamilyShape, guides: Guides, random: _Random, turn: float | None) -> float:
+    """By which all lengths of a draw are scaled, so that it is as large as what was seen or touched."""
+    if random.random() < OWN:
+        return 0.0
+    half, height = size_of(shape.code, shape.theta)
+    if guides.sighted:
+        return float(np.clip(np.log(_seen_scale(guides, half, height, turn)), -_MOST_SCALE, _MOST_SCALE))
+    if not guides.touched:
+        return 0.0
+    wide, high = float(np.linalg.norm(guides.extents[:2])), float(guides.extents[2])
+    least = max(wide / (2.0 * half), high / height)
+    # Contacts reach nearly all of it, or are few and in one part of it.
+    fitting = np.log(least) + random.uniform(0.0, 0.35)
+    return float(np.clip(fitting, -_MOST_SCALE, _MOST_SCALE))
+
+
+def _seen_scale(guides: Guides, half: float, height: float, turn: float | None) -> float:
+    down = -guides.middle_ray[2]
+    away = (guides.eye[2] - 0.4 * height) / max(down, 0.05)
+    if turn is not None:
+        level = guides.on_level(0.5 * height)
+        along = level @ np.array([np.cos(turn), np.sin(turn)])
+        return float(max(np.ptp(along), 1e-3) / (2.0 * half)) if len(along) else 1.0
+    flat = float(np.sqrt(max(1.0 - down * down, 0.0)))
+    tall = height * flat + 2.0 * half * down
+    return float(away * np.sqrt(guides.seen[0] * guides.seen[1] / (2.0 * half * tall)))
+
+
+def _middle(
+    shape: FamilyShape, theta: FloatArray, guides: Guides, random: _Random, place_error: float, long: bool
+) -> FloatArray:
+    by_touch = guides.touched and random.random() < (0.4 if guides.sighted else 0.9)
+    if by_touch:
+        near = guides.middles[random.integers(len(guides.middles))]
+        return np.asarray(near + random.normal(0.0, 5e-3, 2))
+    if not guides.sighted:
+        return np.asarray(random.normal(0.0, place_error, 2))
+    height = size_of(shape.code, theta)[1]
+    if long:
+        level = guides.on_level(0.5 * height)
+        if len(level):
+            return np.asarray(0.5 * (level.min(axis=0) + level.max(axis=0)))
+    away = (guides.eye[2] - 0.45 * height) / max(-guides.middle_ray[2], 0.05)
+    return np.asarray((guides.eye + away * guides.middle_ray)[:2])
+
+
+def _turns(guides: Guides, random: _Random, turn: float | None, count: int) -> FloatArray:
+    """``(count,)`` rad: those that the readings propose and their opposites, then any, evenly spread."""
+    even = random.uniform(0.0, 2.0 * np.pi) + 2.0 * np.pi * np.arange(count) / count
+    if turn is not None:
+        proposed = turn + np.pi * np.arange(count) + random.normal(0.0, 0.05, count)
+        proposed[min(4, count) :] = even[min(4, count) :]
+        return np.asarray(proposed)
+    if len(guides.turns):
+        few = (count + 1) // 3
+        even[:few] = random.choice(guides.turns, few) + 0.5 * np.pi * random.integers(0, 4, few)
+    return np.asarray(even)
+
+
+_LEVEL = 0.5
+"""Vertical part of a normal below which a contact is on a side."""
+
+_REACHES = (0.0, 0.02, 0.04, 0.07)
+"""M behind a side contact that the middle may be."""
+
+
+def guides_of(evidence: ShapeEvidence) -> Guides:
+    """Proposals of some readings."""
+    places, middles, extents, turns = _by_touch(evidence)
+    seen, eye, ray, outline = _by_sight(evidence)
+    return Guides(places, middles, extents, turns, seen, eye, ray, outline)
+
+
+def _by_touch(evidence: ShapeEvidence) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    contacts = evidence.contacts
+    if not contacts:
+        return np.empty((0, 3)), np.empty((0, 2)), np.zeros(3), np.empty(0)
+    places = np.array([touch.points.mean(axis=0) for touch in contacts])
+    normals = np.array([touch.normals.mean(axis=0) for touch in contacts])
+    low, high = places.min(axis=0), places.max(axis=0)
+    extents = high - low
+    extents[2] = max(high[2], 0.0)
+    middles = [0.5 * (low + high)[:2]]
+    sides = np.abs(normals[:, 2]) < _LEVEL
+    if sides.any():
+        middles += [np.median(places[sides, :2] - r * normals[sides, :2], axis=0) for r in _REACHES]
+    axis = _axis(places[sides], normals[sides])
+    if axis is not None:
+        middles.append(axis)
+    flat = np.arctan2(normals[sides, 1], normals[sides, 0])
+    return places, np.array(middles), extents, np.concatenate([flat, _long_way(places[:, :2])])
+
+
+def _axis(places: FloatArray, normals: FloatArray) -> FloatArray | None:
+    """``(2,)`` m: the point that most level normal lines pass; None where they are parallel."""
+    if len(places) < 3:
+        return None
+    level = normals[:, :2] / np.linalg.norm(normals[:, :2], axis=1, keepdims=True)
+    aside = np.column_stack([-level[:, 1], level[:, 0]])
+    offset = np.sum(aside * places[:, :2], axis=1)
+    weights = np.ones(len(places))
+    middle = np.zeros(2)
+    for _ in range(8):
+        square = (aside * weights[:, None]).T @ aside
+        if np.linalg.eigvalsh(square)[0] < 0.05 * weights.sum():
+            return None
+        middle = np.linalg.solve(square, (aside * weights[:, None]).T @ offset)
+        weights = 1.0 / np.maximum(np.abs(aside @ middle - offset), 2e-3)
+        weights *= len(weights) / weights.sum()
+    return np.asarray(middle)
+
+
+def _long_way(places: FloatArray) -> FloatArray:
+    """``(1,)`` rad: the way that plane places spread most; none for fewer than two."""
+    if len(places) < 2:
+        return np.empty(0)
+    _, vectors = np.linalg.eigh(np.cov(places.T))
+    return np.array([np.arctan2(vectors[1, 1], vectors[0, 1])])
+
+
+def long_way(places: FloatArray) -> float:
+    """Rad: the way that plane places spread most; zero for fewer than two."""
+    found = _long_way(places)
+    return float(found[0]) if len(found) else 0.0
+
+
+def _by_sight(evidence: ShapeEvidence) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    look = evidence.look
+    if look is None or not look.mask.any():
+        return np.zeros(2), np.zeros(3), np.zeros(3), np.empty((0, 3))
+    rows, columns = np.nonzero(look.mask)
+    low = np.array([columns.min(), rows.min()])
+    high = np.array([columns.max(), rows.max()]) + 1.0
+    edge = look.mask.copy()
+    edge[1:-1, 1:-1] &= ~(
+        look.mask[:-2, 1:-1] & look.mask[2:, 1:-1] & look.mask[1:-1, :-2] & look.mask[1:-1, 2:]
+    )
+    rows, columns = np.nonzero(edge)
+    outline = directions_of(look, np.column_stack([columns + 0.5, rows + 0.5]))
+    ray = directions_of(look, 0.5 * (low + high)[None])[0]
+    return (high - low) / look.focal_length, look.stand_from_camera[:3, 3].copy(), ray, outline
+
+
+LOOPS, TURNS = 3, 8
+"""Handles drawn where there is none, and turns that each is tried at."""
+
+HEADS, _HOLE = (1.4, 2.0, 2.8), 0.55
+"""Half widths of a tool's head over that of its shaft there; of its hole over its own."""
+
+ASIDE, ASIDE_PLACE, ASIDE_TURN = 0.15, 2.0e-3, 0.1
+"""Deviation of a shape beside another: of its own numbers, in deviations of their prior; of its place, in m
+along x and y; of its turn, in rad."""
+
+_ENDS = (
+    (layout.END_A, layout.SHAFT_A, layout.HEAD_A, layout.HOLE_A),
+    (layout.END_B, layout.SHAFT_B, layout.HEAD_B, layout.HOLE_B),
+)
+
+
+def changes(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
+    """Shapes that differ from one by one part or by a turn."""
+    if has_yaw(shape.code):
+        yield _turned(shape, np.pi)
+    if shape.code[layout.KIND] == TURNED:
+        yield from _of_vessel(shape, random)
+    elif shape.code[layout.KIND] == TOOL:
+        yield from _of_tool(shape)
+
+
+def beside(shape: FamilyShape, random: _Random) -> FamilyShape:
+    """The same parts with all numbers a little off: fitted anew, it may find a better valley nearby."""
+    theta = shape.theta.copy()
+    for slot, sigma in deviations(shape.code).items():
+        theta[slot] += ASIDE * sigma * random.standard_normal()
+    theta[layout.X : layout.Y + 1] += ASIDE_PLACE * random.standard_normal(2)
+    if has_yaw(shape.code):
+        theta[layout.YAW] += ASIDE_TURN * random.standard_normal()
+    return FamilyShape(shape.name, shape.code, theta)
+
+
+def _of_vessel(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
+    code = shape.code
+    yield _coded(shape, layout.HOLLOW, 1 - int(code[layout.HOLLOW]))
+    if code[layout.LIMB] != NO_LIMB:
+        yield _coded(shape, layout.LIMB, NO_LIMB)
+        yield _turned(shape, 0.5 * np.pi)
+        yield _turned(shape, -0.5 * np.pi)
+    if code[layout.LIMB] != LOOP:
+        for _ in range(LOOPS):
+            yield from _all_about(add_loop(shape, random), random)
+    if code[layout.SPOUT] != 0:
+        yield _coded(shape, layout.SPOUT, 0)
+    elif code[layout.LIMB] == LOOP:
+        yield add_spout(shape, random)
+    if code[layout.PLAN] == ROUND:
+        yield _oval(shape, SUPER, 0.9)
+        if code[layout.HOLLOW] == 0:
+            yield _oval(shape, FLAT_SIDED, 0.7)
+    elif code[layout.PLAN] in (SUPER, FLAT_SIDED):
+        yield _coded(shape, layout.PLAN, ROUND)
+        if code[layout.HOLLOW] == 0:
+            yield _coded(shape, layout.PLAN, SUPER if code[layout.PLAN] == FLAT_SIDED else FLAT_SIDED)
+    elif code[layout.PLAN] == CORED:
+        yield _turned(shape, 0.5 * np.pi)
+
+
+def _of_tool(shape: FamilyShape) -> Iterator[FamilyShape]:
+    for end, shaft, head, hole in _ENDS:
+        for kind in (PLAIN, DISC, RING, SLOT):
+            if shape.code[end] == kind:
+                continue
+            changed = _coded(shape, end, kind)
+            yield changed
+            for ratio in HEADS if kind != PLAIN else ():
+                theta = changed.theta.copy()
+                theta[head] = theta[shaft] + np.log(ratio)
+                theta[hole] = theta[head] + np.log(_HOLE)
+                yield FamilyShape(changed.name, changed.code, theta)
+
+
+def _all_about(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
+    """The same at turns that are evenly spread."""
+    first = random.uniform(0.0, 2.0 * np.pi)
+    for turn in range(TURNS):
+        yield _turned(shape, first + 2.0 * np.pi * turn / TURNS)
+
+
+def _turned(shape: FamilyShape, by: float) -> FamilyShape:
+    theta = shape.theta.copy()
+    theta[layout.YAW] += by
+    return FamilyShape(shape.name, shape.code, theta)
+
+
+def _oval(shape: FamilyShape, plan: int, across: float) -> FamilyShape:
+    theta: FloatArray = shape.theta.copy()
+    theta[layout.ACROSS], theta[layout.POWER] = np.log(across), np.log(2.2)
+    return _coded(FamilyShape(shape.name, shape.code, theta), layout.PLAN, plan)
+
+
+def _coded(shape: FamilyShape, slot: int, value: int) -> FamilyShape:
+    code = shape.code.copy()
+    code[slot] = value
+    return FamilyShape(shape.name, code, shape.theta)
