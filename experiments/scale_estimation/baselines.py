@@ -4,8 +4,7 @@ import numpy as np
 
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.size import SizeRange
-from experiments.scale_estimation.sound.model import RingingModel
-from experiments.scale_estimation.sound.peaks import Peaks
+from experiments.scale_estimation.sound.peaks import Peaks, RingingModel
 from experiments.scale_estimation.touch.patch import Patch
 from experiments.scale_estimation.vision.fit import View
 from harness.basics.arrays import FloatArray

@@ -6,7 +6,7 @@ from typing import Any
 
 from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.scale_estimation.dials import KNOBS, OF_SHAPE, OWN
-from experiments.scale_estimation.explore import performer, plan, smallest_error, steps_of
+from experiments.scale_estimation.explorer import performer, plan, smallest_error, steps_of
 from experiments.scale_estimation.report import write
 from experiments.scale_estimation.result import lines_of, result_of
 from experiments.scale_estimation.section import Scale

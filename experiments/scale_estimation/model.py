@@ -8,7 +8,7 @@ import numpy as np
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import SizeRange
 from experiments.scale_estimation.sound.hearing import MaterialGuess
-from experiments.scale_estimation.sound.model import RingingModel
+from experiments.scale_estimation.sound.peaks import RingingModel
 from experiments.scale_estimation.touch.fit import Stand, StandErrors
 from experiments.scale_estimation.vision.fit import View
 from harness.basics.arrays import FloatArray

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
-from experiments.scale_estimation.envelope import placed
+from experiments.scale_estimation.contact_planning import placed
 from experiments.scale_estimation.sound.hearing import Hearing
 from experiments.scale_estimation.touch.touch import Touch
 from experiments.scale_estimation.unseen.spectrogram import FRAMES, band_levels, response_of

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.scale_estimation.size import Belief, SizeRange
-from experiments.scale_estimation.sound.model import RingingModel
-from experiments.scale_estimation.sound.peaks import Peaks, log_likelihood, modes_a_peak
+from experiments.scale_estimation.sound.peaks import Peaks, RingingModel, log_likelihood, modes_a_peak
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.materials import Material

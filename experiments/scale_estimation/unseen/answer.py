@@ -1,7 +1,10 @@
 """The size of an object never drawn, by each sense: what household things look, sound and feel like."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 from types import MappingProxyType
 
 import numpy as np
@@ -12,7 +15,6 @@ from experiments.scale_estimation.touch.fit import USUAL_PLACE
 from experiments.scale_estimation.touch.patch import Patch
 from experiments.scale_estimation.unseen.contact_set import GelWay, distinct_ways
 from experiments.scale_estimation.unseen.network import by_imprints, by_strikes, by_ways, shipped
-from experiments.scale_estimation.unseen.real_shapes import shape_sigma
 from experiments.scale_estimation.unseen.regression import by_outline, features_of
 from experiments.scale_estimation.unseen.spectrogram import response_of
 from harness.basics.arrays import FloatArray
@@ -142,3 +144,17 @@ def load_networks(sound: bool, touch: bool) -> None:
     for sense, asked in (("sound", sound), ("touch", touch)):
         if asked:
             shipped(sense)
+
+
+WRITTEN = "data/real_shapes.json"
+
+
+@cache
+def shape_sigma(sense: str) -> float:
+    """Deviation of the size's logarithm that is added to a sense's answer about an object never drawn.
+
+    It is the one with which scanned things are likeliest that no network and no table has seen;
+    ``training.real_shapes`` finds it.
+    """
+    written = json.loads((files(__package__) / WRITTEN).read_text())
+    return float(written[sense]["sigma"])

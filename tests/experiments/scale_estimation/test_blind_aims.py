@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.scale_estimation.blind_aims import FLATTEST, aims_unmet, is_flat, lowest_end
-from experiments.scale_estimation.envelope import placed
+from experiments.scale_estimation.contact_planning import FLATTEST, aims_unmet, is_flat, lowest_end, placed
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.touch.patch import POINTS, Patch, free_line
 from harness.basics.arrays import FloatArray

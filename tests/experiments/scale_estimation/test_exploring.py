@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from experiments.scale_estimation.envelope import blind_envelope, seen_envelope
+from experiments.scale_estimation.contact_planning import blind_envelope, seen_envelope
 from experiments.scale_estimation.experiment import EXPERIMENT
-from experiments.scale_estimation.next_contact import Explorer
+from experiments.scale_estimation.explorer import Explorer
 from harness.basics.errors import WrongUse
 from harness.bench.station_file import Station
 from harness.experiment.begin import begin

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from onnx import ModelProto
 
-from experiments.scale_estimation.explore import plan
+from experiments.scale_estimation.explorer import plan
 from experiments.scale_estimation.touch.patch import Patch
 from experiments.scale_estimation.unseen.paper.inputs import (
     FRAMES,

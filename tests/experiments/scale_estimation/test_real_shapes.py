@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.scale_estimation.size import Belief, SizeRange
-from experiments.scale_estimation.unseen.real_shapes import shape_sigma
+from experiments.scale_estimation.unseen.answer import shape_sigma
 from experiments.scale_estimation.unseen.training.real_shapes import (
     SIGMAS,
     likeliest_sigma,

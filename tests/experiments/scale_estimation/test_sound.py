@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.scale_estimation.readings import peaks_of
+from experiments.scale_estimation.answer import peaks_of
 from experiments.scale_estimation.size import ENDS, STEP, Belief, SizeRange
 from experiments.scale_estimation.sound import hearing
 from experiments.scale_estimation.sound.hearing import SHAPE_SIGMA, Hearing, MaterialGuess, by_sound
-from experiments.scale_estimation.sound.model import RingingModel
 from experiments.scale_estimation.sound.peaks import (
     CLUTTER_FALL,
     Peaks,
+    RingingModel,
     UnsolvedModes,
     log_likelihood,
     modes_a_peak,

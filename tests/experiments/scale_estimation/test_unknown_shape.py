@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 
 from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.scale_estimation.experiment import EXPERIMENT
-from experiments.scale_estimation.next_contact import Explorer
+from experiments.scale_estimation.explorer import Explorer
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station

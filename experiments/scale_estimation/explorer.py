@@ -1,32 +1,41 @@
-"""Where the next contact of a scale estimation goes: where it tells most of the size, on a free way.
+"""Plan the steps of a run: a camera image, then contacts chosen one by one from what is known by then.
 
 The arm travels around all the space that the object may take, and enters it on straight lines only, slowly,
-stopping at a touch. Lines are chosen on the object as it is believed to stand; where nothing is known yet, or
-its shape never is, they lead to where it should be.
+stopping at a touch. Lines are chosen on the object at its estimated pose. Without an estimate, or without a
+known shape, they lead to where the object should be.
 """
 
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 
-from experiments.scale_estimation.answer import ScaleAnswering
-from experiments.scale_estimation.believed import believed
-from experiments.scale_estimation.blind_aims import aims_unmet, is_flat
+from experiments.scale_estimation.answer import ScaleAnswering, patch_of_contact
+from experiments.scale_estimation.contact_planning import (
+    aims_unmet,
+    blind_envelope,
+    contact_on_object,
+    is_flat,
+    seen_envelope,
+    strike_met,
+)
 from experiments.scale_estimation.dials import KNOBS
-from experiments.scale_estimation.envelope import blind_envelope, seen_envelope
 from experiments.scale_estimation.model import ObjectModel
-from experiments.scale_estimation.on_object import contact_on_object
-from experiments.scale_estimation.readings import patch_of_contact
 from experiments.scale_estimation.section import Scale
-from experiments.scale_estimation.strike_met import strike_met
+from experiments.scale_estimation.size import CREDIBLE, SHARED
+from experiments.scale_estimation.touch.fit import UNKNOWNS, FreeSpace, TouchProblem
 from experiments.scale_estimation.touch.patch import Patch
+from experiments.scale_estimation.touch.touch import by_touch
 from experiments.scale_estimation.vision.vision import SeenStand
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, MotionRefused, PictureRefused, WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench.reading import Reading
+from harness.bench.scene import SceneFile
+from harness.bench.station_file import Station
+from harness.experiment.experiment import ErrorBound, Helpers, Planned
 from harness.experiment.levels import chosen_levels
 from harness.picture.outline import SeenOutline
 from harness.picture.square_pixels import aspect_stated
@@ -34,7 +43,7 @@ from harness.recording.observation import observe_step
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import Step, StepRecord
-from harness.skills.exploring.exploration import SKIPPED
+from harness.skills.exploring.exploration import SKIPPED, Exploration, kinds
 from harness.skills.exploring.lines import LineTarget, contact_along, lines_to, unlike_first
 from harness.skills.exploring.surroundings import Surroundings, end_of
 from harness.skills.exploring.unknown_space import (
@@ -48,6 +57,60 @@ from harness.skills.planning import HOME
 from harness.skills.strike import POSE, READY, StrikeMotion
 from harness.twin.bench import TwinBench
 from harness.twin.bench_of import way_between
+from harness.twin.rehearsal import rehearse
+
+
+def steps_of(scene: SceneFile) -> int:
+    """How many steps a run of a scene has, if it is not surer before."""
+    sensors = scene.sensors
+    contacts = scene.section(Scale).contacts if sensors.touch or sensors.sound else 0
+    return int(sensors.camera) + contacts
+
+
+def smallest_error(scene: SceneFile, mesh: Mesh) -> ErrorBound:
+    """Return the narrowest half interval that an answer can state: every sense shares ``SHARED``."""
+    nominal = float((mesh.bounds[1] - mesh.bounds[0]).max())
+    low = scene.object.sizes_of(nominal)[0] if scene.object.is_hidden else nominal
+    half = NormalDist().inv_cdf(0.5 + 0.5 * CREDIBLE)
+    return ErrorBound(
+        half * SHARED * low,
+        f"half the 90 % interval of an object {1e3 * low:.0f} mm long: all senses share an error of "
+        f"{100 * SHARED:g} % of the size, which no contact reduces",
+        "or leave it out to make every contact",
+    )
+
+
+def plan(scene: SceneFile, station: Station, mesh: Mesh, _seed: int) -> Planned:
+    """A look where there is a camera, then so many contacts; each is planned once those before are read.
+
+    Raises:
+        WrongUse: nothing is to be read, or the scene names networks that only a table uses.
+    """
+    if scene.section(Scale).paper_networks is not None:
+        raise WrongUse(
+            "[scale] paper_networks adds rows to a table and is not used by a run; leave it out of the "
+            "scene, or measure with: touchstone tables scale-estimation --set paper_networks=FOLDER"
+        )
+    looks, count = scene.sensors.camera, steps_of(scene)
+    if count == 0:
+        raise WrongUse("nothing is to be read: ask for vision, for contacts, or for both")
+    model = ObjectModel(mesh, scene, station)
+    bench = model.twin_around(model.nowhere)
+    steps = kinds(looks, count - looks)
+    return Planned(steps, rehearse(bench, []), bench, on_the_way=count - looks)
+
+
+def performer(run: RunFiles, helpers: Helpers) -> Exploration:
+    """Looks, then presses and strikes where the object must be, by what is known so far.
+
+    Args:
+        run: the folder.
+        helpers: what a step may use beside the bench.
+    """
+    explorer = Explorer(run)
+    enough = "the size is known as well as was asked"
+    return Exploration(explorer, helpers.ask, helpers.say, enough, explorer.strike)
+
 
 LARGEST = 0.999
 """Probability that an object of unknown shape is no larger than travels allow for, by its outline."""
@@ -211,3 +274,49 @@ class Explorer:
 
     def _strikes_left(self) -> int:
         return self._asked.strikes - self._struck if self._run.scene.sensors.sound else 0
+
+
+BELIEVED_AFTER = 2
+"""Contacts without a look after which the object is believed to stand where they say."""
+
+ALONG_SIGHT = (0.0, 1.0, -1.0, 2.0, -2.0)
+"""Standard deviations of its place along the line of sight at which a seen object is thought of."""
+
+SURE_OF_SIZE = 0.1
+"""Of the size's logarithm: where contacts fit a seen object farther off than that, it is by chance."""
+
+
+def believed(answering: ScaleAnswering, seen: Sequence[SeenStand]) -> FloatArray | None:
+    """``(4,)`` of the hypothesis that fits all readings best; None where there is none yet."""
+    return _of_seen(answering, seen) if seen else _of_touched(answering)
+
+
+def _of_touched(answering: ScaleAnswering) -> FloatArray | None:
+    model, patches = answering.model, answering.patches
+    if len(patches) < BELIEVED_AFTER:
+        return None
+    try:
+        found = by_touch(model.stand, patches, model.nominal, model.sizes, free=answering.free)
+    except FitRefused:
+        return None
+    return np.asarray(found.unknowns[:4])
+
+
+def _of_seen(answering: ScaleAnswering, seen: Sequence[SeenStand]) -> FloatArray:
+    """Of every turn that was seen, and places along the line of sight: what the contacts fit best."""
+    model, patches = answering.model, answering.patches
+    away = np.array(ALONG_SIGHT)
+    starts = np.zeros((len(seen) * len(away), UNKNOWNS))
+    for row, (stand, far) in enumerate((stand, far) for stand in seen for far in away):
+        starts[row, :4] = stand.unknowns
+        starts[row, 1:3] += far * stand.farthest
+    costs = 0.5 * np.tile(away, len(seen)) ** 2
+    problem = TouchProblem(model.stand, patches, len(patches[0].points) if patches else 1)
+    found = starts
+    if patches:
+        found, misfits = problem.refined(starts, 8, fixed_size=False)
+        costs = costs + misfits
+    best = int((costs + FreeSpace(model.stand, answering.free).cost(found)).argmin())
+    # A few contacts can be fitted by another size: what was seen of it holds.
+    kept = found if abs(found[best, 0] - starts[best, 0]) < SURE_OF_SIZE else starts
+    return np.asarray(kept[best, :4])
