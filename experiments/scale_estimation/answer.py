@@ -17,13 +17,13 @@ from experiments.scale_estimation.touch.patch import Patch, free_line, patch_of
 from experiments.scale_estimation.touch.touch import Touch, by_touch
 from experiments.scale_estimation.unseen.answer import (
     ShapelessAnswer,
-    load_networks,
     outline_alone,
     strikes_alone,
     together_without_shape,
     ways_alone,
 )
 from experiments.scale_estimation.unseen.contact_set import GelWay
+from experiments.scale_estimation.unseen.network import shipped
 from experiments.scale_estimation.vision.vision import SeenStand, Sight, by_sight, stands_seen
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused, MeshRefused, PictureRefused, WrongUse
@@ -121,7 +121,9 @@ class ScaleAnswering:
         """Make what depends on the object alone, while the arm has other things to do."""
         sensors = self.run.scene.sensors
         if not self.shape_known:
-            load_networks(sensors.sound, sensors.touch)
+            for sense, asked in (("sound", sensors.sound), ("touch", sensors.touch)):
+                if asked:
+                    shipped(sense)
             return
         if sensors.touch:
             _ = self.model.stand.tree, self.model.stand.places

@@ -7,6 +7,7 @@ the space that the object may take.
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -26,14 +27,13 @@ from harness.sim.gel.height_map import RasterMesh
 from harness.skills.exploring.envelope import PLACES, around, margin_of
 from harness.skills.exploring.lines import LINES, LOWEST, LineTarget
 from harness.skills.exploring.surroundings import Surroundings, rehearsed_strike
-from harness.skills.exploring.unknown_space import FLAT
 from harness.skills.planning import Itinerary
 from harness.skills.press import ContactMotion
 from harness.skills.sites import PressLimits, Site, plan_sites
 from harness.skills.strike import StrikeMotion, planner
 from harness.twin.bench import TwinBench
 from harness.twin.bench_of import twin_of
-from harness.twin.motion import PlannedContact, reachable
+from harness.twin.motion import reachable
 from harness.twin.rehearsal import rehearse
 
 CANDIDATES = 6
@@ -90,22 +90,15 @@ def contact_on_object(
 
 
 def _rehearsed(itinerary: Itinerary, lines: TwinBench, here: Surroundings, site: Site) -> dict[str, Any]:
-    contact = itinerary.contacts[0]
+    """Rehearse a contact and its strikes; the parameters of the step."""
+    contact, axis = itinerary.contacts[0], site.base_from_gel[:3, 2]
     rehearse(here.travels, contact.travels(0)).require()
     rehearse(lines, contact.lines(0)).require()
-    beyond = _overtravel(here.nothing, contact, site.base_from_gel[:3, 2])
-    made = ContactMotion.planned(contact, lines.flange_from_gel, site.press, beyond).to_parameters()
+    free = (by for by in BEYOND if not rehearse(here.nothing, [contact.searched(0, by, axis)]).refusals)
+    made = ContactMotion.planned(contact, lines.flange_from_gel, site.press, next(free, 0.0)).to_parameters()
     for strike in itinerary.strikes:
         made["strike"] = rehearsed_strike(strike, here.travels, lines).to_parameters()
     return made
-
-
-def _overtravel(nothing: TwinBench, contact: PlannedContact, axis: FloatArray) -> float:
-    """M that a search may go on beyond where the object is believed to be, nothing else being met."""
-    for beyond in BEYOND:
-        if not rehearse(nothing, [contact.searched(0, beyond, axis)]).refusals:
-            return beyond
-    return 0.0
 
 
 def _most_telling(
@@ -175,11 +168,6 @@ def aims_unmet(
     return [LineTarget(ends[k], above=True, lowest=lowest) for k in order]
 
 
-def is_flat(model: ObjectModel) -> bool:
-    """Whether lines that slant would pass above it."""
-    return _height(model) < FLAT * model.nominal
-
-
 def _met(model: ObjectModel, stands: FloatArray, aims: FloatArray, lowest: float) -> BoolArray:
     """``(a, k)``: whether the gel, coming down on ``(a, 2)`` m off the place, meets objects that stand so."""
     scale = np.exp(stands[:, 0])
@@ -191,14 +179,9 @@ def _met(model: ObjectModel, stands: FloatArray, aims: FloatArray, lowest: float
     return np.asarray(heights.max(axis=-1) * scale > lowest)
 
 
-def _height(model: ObjectModel) -> float:
-    """M, of the nominal object above the support."""
-    return float(model.corners[:, 2].max())
-
-
 def lowest_end(model: ObjectModel) -> float:
     """M above the support where lines from above end: half as high as the smallest one, if that is less."""
-    flattest = _height(model) * model.sizes.low / model.nominal
+    flattest = model.height * model.sizes.low / model.nominal
     return float(np.clip(0.5 * flattest, FLATTEST, LOWEST))
 
 
@@ -247,31 +230,23 @@ def strike_met(
     """
     if float(-rotation[:, 2] @ patch.normal) < np.cos(STEEPEST):
         return None
-    lines = model.twin_around(_with_plate(model.nowhere, patch, rotation))
+    deepest = patch.points[int((patch.points @ rotation[:, 2]).argmin())]  # of a rim, where it is thickest
+    crest, mark = transform(rotation, deepest), model.nowhere
+    # The mark on the support, and a small plate whose face is where the surface was touched; in base.
+    corners = np.array(list(product((-_SIDE, _SIDE), (-_SIDE, _SIDE), (0.0, _THICK))))
+    plate = closed_hull(apply(crest, corners))
+    vertices = np.concatenate([mark.vertices, plate.vertices])
+    lines = model.twin_around(Mesh(vertices, np.concatenate([mark.faces, plate.faces + len(mark.vertices)])))
     plans = planner(here.scene, here.station, lines, here.travels)
     if plans is None:
         return None
-    strike = plans.plan(transform(rotation, _crest(patch, rotation)), here.joints, searched=_SEARCHED)
+    strike = plans.plan(crest, here.joints, searched=_SEARCHED)
     if strike is None:
         return None
     try:
         return rehearsed_strike(strike, here.travels, lines)
     except MotionRefused:
         return None
-
-
-def _crest(patch: Patch, rotation: FloatArray) -> FloatArray:
-    """``(3,)`` m in base: the place that reached deepest into the gel; of a rim, where it is thickest."""
-    return np.asarray(patch.points[int((patch.points @ rotation[:, 2]).argmin())])
-
-
-def _with_plate(mark: Mesh, patch: Patch, rotation: FloatArray) -> Mesh:
-    """The mark on the support, and a small plate whose face is where the surface was touched; in base."""
-    ends = np.array([[-_SIDE, -_SIDE, 0.0], [_SIDE, _SIDE, _THICK]])
-    corners = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-    plate = closed_hull(apply(transform(rotation, _crest(patch, rotation)), corners))
-    vertices = np.concatenate([mark.vertices, plate.vertices])
-    return Mesh(vertices, np.concatenate([mark.faces, plate.faces + len(mark.vertices)]))
 
 
 _YAWS = 24

@@ -21,7 +21,7 @@ from experiments.scale_estimation.table import (
     scene_of,
 )
 from harness.effects.accuracy import Accuracy, Setting
-from harness.experiment.experiment import Experiment, MeasuredCondition, Scored
+from harness.experiment.experiment import Experiment, MeasuredCondition
 from harness.experiment.plain import PlainPerforms, plain_budgets, plain_measurement
 from harness.recording.run_folder import RunFiles
 from harness.skills.exploring.exploration import PLAN_KEY
@@ -33,11 +33,6 @@ def _answering(run: RunFiles, accuracy: Accuracy) -> ScaleAnswering:
     answering = ScaleAnswering(run, accuracy)
     answering.load()
     return answering
-
-
-def _sources(_scored: Scored) -> Mapping[str, Any]:
-    """Nothing yet: readings are simulated at the drawing's size only."""
-    return {}
 
 
 _ALL_DIALS = plain_measurement(NAME, *OWN)
@@ -81,7 +76,7 @@ EXPERIMENT = Experiment(
     answering=_answering,
     result=result_of,
     lines=lines_of,
-    sources=_sources,
+    sources=lambda _scored: {},  # readings are simulated at the CAD model's size only
     gives=(),
     report=write,
     measurement=MEASUREMENT,

@@ -17,7 +17,6 @@ from experiments.scale_estimation.contact_planning import (
     aims_unmet,
     blind_envelope,
     contact_on_object,
-    is_flat,
     seen_envelope,
     strike_met,
 )
@@ -47,6 +46,7 @@ from harness.skills.exploring.exploration import SKIPPED, Exploration, kinds
 from harness.skills.exploring.lines import LineTarget, contact_along, lines_to, unlike_first
 from harness.skills.exploring.surroundings import Surroundings, end_of
 from harness.skills.exploring.unknown_space import (
+    FLAT,
     SeenThing,
     aims_of_seen,
     aims_unseen,
@@ -175,9 +175,12 @@ class Explorer:
         self._take_in(recording, index)
         here = self._surroundings()
         random = np.random.default_rng((recording.header.seed, index))
-        stand = believed(self._answering, self._seen) if self._drawn else None
+        stand = None
+        if self._drawn:
+            seen = self._seen
+            stand = _stand_from_look(self._answering, seen) if seen else _stand_from_contacts(self._answering)
         if stand is not None:
-            strikes = bool(self._seen) and self._strikes_left() > 0
+            strikes = bool(seen) and self._strikes_left() > 0
             with suppress(WrongUse, MotionRefused):
                 return contact_on_object(here, self._model, self._answering.patches, stand, random, strikes)
         aims, support = self._aims(random), float(self._model.place[2])
@@ -262,14 +265,14 @@ class Explorer:
         model = self._model
         if self._thing is not None:
             return aims_of_seen(self._thing, float(model.place[2]), self._contacts, random)
-        if self._drawn and not self._seen and is_flat(model):
+        if self._drawn and not self._seen and model.height < FLAT * model.nominal:
             return aims_unmet(model, self._answering.patches, self._answering.free, random)
         middle = model.place
         if self._seen:
             middle = middle + np.array([*self._seen[0].unknowns[1:3], 0.0])
         height = model.sizes.low
         if self._drawn:
-            height = _LOW * float(model.corners[:, 2].max()) * model.sizes.low / model.nominal
+            height = _LOW * model.height * model.sizes.low / model.nominal
         return aims_unseen(middle, model.place_error, height, self._contacts == 0, random)
 
     def _strikes_left(self) -> int:
@@ -286,12 +289,7 @@ SURE_OF_SIZE = 0.1
 """Of the size's logarithm: where contacts fit a seen object farther off than that, it is by chance."""
 
 
-def believed(answering: ScaleAnswering, seen: Sequence[SeenStand]) -> FloatArray | None:
-    """``(4,)`` of the hypothesis that fits all readings best; None where there is none yet."""
-    return _of_seen(answering, seen) if seen else _of_touched(answering)
-
-
-def _of_touched(answering: ScaleAnswering) -> FloatArray | None:
+def _stand_from_contacts(answering: ScaleAnswering) -> FloatArray | None:
     model, patches = answering.model, answering.patches
     if len(patches) < BELIEVED_AFTER:
         return None
@@ -302,7 +300,7 @@ def _of_touched(answering: ScaleAnswering) -> FloatArray | None:
     return np.asarray(found.unknowns[:4])
 
 
-def _of_seen(answering: ScaleAnswering, seen: Sequence[SeenStand]) -> FloatArray:
+def _stand_from_look(answering: ScaleAnswering, seen: Sequence[SeenStand]) -> FloatArray:
     """Of every turn that was seen, and places along the line of sight: what the contacts fit best."""
     model, patches = answering.model, answering.patches
     away = np.array(ALONG_SIGHT)

@@ -91,6 +91,11 @@ class ObjectModel:
         return hull_of((self.mesh.vertices - self.anchor) @ self.upright.T)
 
     @property
+    def height(self) -> float:
+        """M, of the nominal object above the support."""
+        return float(self.corners[:, 2].max())
+
+    @property
     def nowhere(self) -> Mesh:
         """A mark of 2 mm on the support, in base: stands for an object of which nothing is known."""
         return nowhere(self.place)

@@ -1,17 +1,15 @@
 """The pictures of a scale estimation's report: what each sense read, beside the model at the size found."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
 from experiments.scale_estimation.contact_planning import placed
-from experiments.scale_estimation.sound.hearing import Hearing
 from experiments.scale_estimation.touch.touch import Touch
 from experiments.scale_estimation.unseen.spectrogram import FRAMES, band_levels, response_of
 from experiments.scale_estimation.vision.vision import Sight
-from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh_hull import hull_of
@@ -39,20 +37,18 @@ _NAME = "scale-estimation"
 def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path) -> Path:
     """Draw the report; the path of its page."""
     folder.mkdir(parents=True, exist_ok=True)
-    sections = tuple(_sections(scored, Album(folder)))
-    return write_run_page(named(_NAME), scored, comparison, health, folder, sections)
-
-
-def _sections(scored: Scored, album: Album) -> Iterator[PageSection]:
+    album = Album(folder)
     answering: ScaleAnswering = scored.answering
     found: SizeAnswer = scored.found
-    yield _believed(scored, album)
+    sections = [_believed(scored, album)]
     if isinstance(answering.outline, SeenOutline):
-        yield _seen(answering, answering.outline, found.sight, album)
+        sections.append(_seen(answering, answering.outline, found.sight, album))
     if answering.strikes:
-        yield _heard(answering, found, album) if answering.shape_known else _spectrum(answering, album)
+        known = answering.shape_known
+        sections.append(_heard(answering, found, album) if known else _spectrum(answering, album))
     if answering.free:
-        yield _touched(answering, found, album)
+        sections.append(_touched(answering, found, album))
+    return write_run_page(named(_NAME), scored, comparison, health, folder, tuple(sections))
 
 
 def _believed(scored: Scored, album: Album) -> PageSection:
@@ -82,7 +78,9 @@ def _seen(answering: ScaleAnswering, outline: SeenOutline, sight: Sight | None, 
         words = "The size is told from how far the outline reaches, by what household things look like."
     if sight is not None:
         view = answering.model.view
-        fitted = _around(hull_of(view.project(sight.fit.unknowns[None], view.corners)[0]))
+        corners = hull_of(view.project(sight.fit.unknowns[None], view.corners)[0])
+        around = np.arctan2(*(corners - corners.mean(axis=0)).T[::-1])
+        fitted = np.asarray(corners[np.argsort(around)])
         words = f"The two leave each other by {sight.fit.rms:.2f} px (rms)."
     return PageSection(
         "By sight", words, album.photograph("outline", outline_figure(picture, corners_of(outline), fitted))
@@ -103,19 +101,12 @@ def _heard(answering: ScaleAnswering, found: SizeAnswer, album: Album) -> PageSe
         np.column_stack([model.frequencies * np.exp(-log_size), levels]),
         peaks.band,
     )
-    return PageSection(
-        "By sound",
-        _heard_words(hearing, len(peaks.frequencies)),
-        album.drawing("peaks", resonances_figure(shown)),
-    )
-
-
-def _heard_words(hearing: Hearing | None, count: int) -> str:
+    words = f"{len(peaks.frequencies)} peaks were heard"
     if hearing is None:
-        return f"{count} peaks were heard, and are no answer; the model is drawn at the fused size."
-    return (
-        f"{count} peaks were heard; the model explains them by {hearing.matched:.1f} nats each over chance."
-    )
+        words += ", and are no answer; the model is drawn at the fused size."
+    else:
+        words += f"; the model explains them by {hearing.matched:.1f} nats each over chance."
+    return PageSection("By sound", words, album.drawing("peaks", resonances_figure(shown)))
 
 
 def _spectrum(answering: ScaleAnswering, album: Album) -> PageSection:
@@ -139,7 +130,12 @@ def _touched(answering: ScaleAnswering, found: SizeAnswer, album: Album) -> Page
     model, touch = answering.model, found.touch
     surface = np.zeros((0, 3))
     if answering.shape_known:
-        surface = placed(model, model.stand.points, _stand(found, answering)) - model.place
+        stand = np.array([np.log(found.fused.size / model.nominal), 0.0, 0.0, 0.0])
+        if touch is not None:
+            stand = touch.unknowns[:4]
+        elif found.sight is not None:
+            stand = found.sight.fit.unknowns[:4]
+        surface = placed(model, model.stand.points, stand) - model.place
     contacts = np.array([patch.points.mean(axis=0) - model.place for patch in answering.patches])
     passed = [line - model.place for line, met in zip(answering.free, answering.met, strict=True) if not met]
     words = (
@@ -149,18 +145,3 @@ def _touched(answering: ScaleAnswering, found: SizeAnswer, album: Album) -> Page
         words += f" The contacts cost {touch.cost:.2f} each at the size found by touch."
     shown = TouchedObject(surface, contacts.reshape(-1, 3), passed)
     return PageSection("By touch", words, album.drawing("contacts", touched_figure(shown)))
-
-
-def _stand(found: SizeAnswer, answering: ScaleAnswering) -> FloatArray:
-    """``(4,)`` the size found, where and how turned touch or else sight has it."""
-    if found.touch is not None:
-        return found.touch.unknowns[:4]
-    if found.sight is not None:
-        return found.sight.fit.unknowns[:4]
-    return np.array([np.log(found.fused.size / answering.model.nominal), 0.0, 0.0, 0.0])
-
-
-def _around(corners: FloatArray) -> FloatArray:
-    """Corners of a convex polygon in order around it."""
-    middle = corners.mean(axis=0)
-    return np.asarray(corners[np.argsort(np.arctan2(*(corners - middle).T[::-1]))])

@@ -1,6 +1,6 @@
 """A scale estimation's answer as JSON values, and in lines for people."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import combinations
 from typing import Any
 
@@ -42,7 +42,12 @@ def result_of(scored: Scored) -> dict[str, Any]:
             estimates[sense] = estimate_of(one.belief, truth, seconds)
     seconds = sum(found.seconds.values())
     estimates["fused"] = estimate_of(found.fused, truth, seconds)
-    model = scored.answering.model
+    model, left_out = scored.answering.model, scored.answering.left_out
+    heard, other, material = found.by_sense.get("audio"), found.sight or found.touch, None
+    if isinstance(heard, Hearing) and other is not None:
+        # Sound alone knows the speed once sight or touch have fixed the size.
+        stated = scored.answering.model.ringing(scored.accuracy).material.speed
+        material = heard.speed(stated, other.belief)
     return {
         "size_m": found.fused.size,
         "error_m": estimates["fused"]["error_m"],
@@ -53,11 +58,11 @@ def result_of(scored: Scored) -> dict[str, Any]:
         "contacts": found.contacts,
         "strikes": found.strikes,
         "estimates": estimates,
-        "sqrt_young_over_density": _material(scored),
+        "sqrt_young_over_density": material,
         "seconds": seconds,
         "warnings": [
             *scored.answering.refused_pictures,
-            *_left_out(scored.answering.left_out),
+            *([f"{len(left_out)} contacts were left out; of the last: {left_out[-1]}"] if left_out else []),
             *_doubts(found),
         ],
     }
@@ -83,20 +88,6 @@ def _none(why: str, seconds: float | None = None) -> dict[str, Any]:
     return {**dict.fromkeys(names), "seconds": seconds, "refused": why}
 
 
-def _material(scored: Scored) -> dict[str, Any] | None:
-    """What sound alone knows once sight or touch have fixed the size: the speed sqrt(E / density), m/s."""
-    found: SizeAnswer = scored.found
-    heard, other = found.by_sense.get("audio"), found.sight or found.touch
-    if not isinstance(heard, Hearing) or other is None:
-        return None
-    material = scored.answering.model.ringing(scored.accuracy).material
-    return heard.speed(material.speed, other.belief)
-
-
-def _left_out(reasons: Sequence[str]) -> list[str]:
-    return [f"{len(reasons)} contacts were left out; of the last: {reasons[-1]}"] if reasons else []
-
-
 def _doubts(found: SizeAnswer) -> list[str]:
     answers = [(sense, one) for sense, one in found.by_sense.items() if not isinstance(one, FitRefused)]
     stated = [f"{sense}: {one}" for sense, one in found.by_sense.items() if isinstance(one, FitRefused)]
@@ -105,7 +96,8 @@ def _doubts(found: SizeAnswer) -> list[str]:
         f"{a} ({_span(one.belief)}) and {b} ({_span(other.belief)}) contradict each other: one of them read "
         "another object, or a bench unlike what the station states; look at the readings of both"
         for (a, one), (b, other) in combinations(answers, 2)
-        if not _meet(one.belief, other.belief)
+        if max(one.belief.interval[0], other.belief.interval[0])
+        > min(one.belief.interval[1], other.belief.interval[1])
     ]
     return stated
 
@@ -145,12 +137,6 @@ def _width(belief: Belief) -> float:
 def _span(belief: Belief) -> str:
     low, high = belief.interval
     return f"{1e2 * low:.1f} to {1e2 * high:.1f} cm"
-
-
-def _meet(one: Belief, other: Belief) -> bool:
-    """Whether two nine-tenths intervals overlap at all."""
-    (a, b), (c, d) = one.interval, other.interval
-    return max(a, c) <= min(b, d)
 
 
 def lines_of(result: Mapping[str, Any]) -> list[str]:

@@ -125,8 +125,12 @@ class Belief:
         """``(n,)`` probabilities of the sizes in the range, as the answer is about those."""
         found = np.where(self.range.possible, np.exp(self.log_density), 0.0)
         total = found.sum()
+        if total > 0.0:
+            return found / total
         # Nothing inside: the border nearest to what is believed.
-        return found / total if total > 0.0 else _nearest(self.range, self.log_density)
+        inside, best = np.flatnonzero(self.range.possible), int(np.argmax(self.log_density))
+        found[inside[0] if best < inside[0] else inside[-1]] = 1.0
+        return found
 
     @property
     def outside(self) -> float:
@@ -226,11 +230,3 @@ def _quantile(logs: FloatArray, shares: FloatArray, share: float) -> float:
     k = int(np.searchsorted(ends, share * ends[-1]))
     before = ends[k] - shares[k]
     return float(logs[k] + STEP * ((share * ends[-1] - before) / shares[k] - 0.5))
-
-
-def _nearest(range_: SizeRange, log_density: FloatArray) -> FloatArray:
-    shares = np.zeros(len(log_density))
-    inside = np.flatnonzero(range_.possible)
-    best = int(np.argmax(log_density))
-    shares[inside[0] if best < inside[0] else inside[-1]] = 1.0
-    return shares

@@ -148,15 +148,13 @@ def readings_on(
         gone = along[rows, first][met]
         depth = back - gone
         at = starts.reshape(-1, len(places), 3)[rows, first][met] + gone[:, None] * lines[met, :3, 2]
-        one[met] = np.column_stack([depth / DEPTH, _normals(shape, at) / NORMAL])
+        steps = _ASIDE * np.concatenate([np.eye(3), -np.eye(3)])
+        around = (at[:, None] + steps).reshape(-1, 3)
+        gaps = distances(shape.code, shape.theta, around).reshape(-1, 6)
+        slopes = gaps[:, :3] - gaps[:, 3:]
+        normals = slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-12)
+        one[met] = np.column_stack([depth / DEPTH, normals / NORMAL])
     return found
-
-
-def _normals(shape: FamilyShape, places: FloatArray) -> FloatArray:
-    steps = _ASIDE * np.concatenate([np.eye(3), -np.eye(3)])
-    gaps = distances(shape.code, shape.theta, (places[:, None] + steps).reshape(-1, 3)).reshape(-1, 6)
-    slopes = gaps[:, :3] - gaps[:, 3:]
-    return np.asarray(slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-12))
 
 
 def distances_apart(shapes: Sequence[FamilyShape]) -> FloatArray:

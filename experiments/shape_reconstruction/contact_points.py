@@ -58,7 +58,13 @@ def contact_points(heights: FloatArray, errors: FloatArray, pitch: float) -> Con
     rows, columns = _spread(core, POINTS)
     points = _on_face(heights.shape, rows, columns, pitch)
     points[:, 2] = -heights[rows, columns]
-    slopes = _slopes(heights, core, pitch)[rows, columns]
+    # Slopes are averaged, not heights: at a border the average of heights leans inward.
+    weight = np.where(binary_erosion(core, border_value=1), 1.0, _BORDER) * core
+    total = np.maximum(gaussian_filter(weight, _SMOOTH), np.finfo(np.float64).tiny)
+    down, right = np.gradient(heights, pitch)
+    slopes = np.stack(
+        [(gaussian_filter(weight * slope, _SMOOTH) / total)[rows, columns] for slope in (right, down)], axis=1
+    )
     normals = np.column_stack([-slopes, -np.ones(len(slopes))])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     clear = _on_face(heights.shape, *_spread(heights < TOUCHED, CLEAR), pitch)
@@ -70,17 +76,6 @@ def _on_face(shape: tuple[int, ...], rows: IntArray, columns: IntArray, pitch: f
     across = (columns - 0.5 * (shape[1] - 1)) * pitch
     along = (rows - 0.5 * (shape[0] - 1)) * pitch
     return np.column_stack([across, along, np.zeros(len(rows))])
-
-
-def _slopes(heights: FloatArray, core: BoolArray, pitch: float) -> FloatArray:
-    """``(rows, columns, 2)`` of the indentation along x and y, by what was touched alone.
-
-    Slopes are averaged, not heights: at a border the average of heights leans inward.
-    """
-    weight = np.where(binary_erosion(core, border_value=1), 1.0, _BORDER) * core
-    total = np.maximum(gaussian_filter(weight, _SMOOTH), np.finfo(np.float64).tiny)
-    down, right = np.gradient(heights, pitch)
-    return np.stack([gaussian_filter(weight * slope, _SMOOTH) / total for slope in (right, down)], axis=2)
 
 
 def _spread(core: BoolArray, count: int) -> tuple[IntArray, IntArray]:

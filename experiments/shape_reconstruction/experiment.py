@@ -1,8 +1,5 @@
 """Shape reconstruction as an experiment: what does an object never seen look like?"""
 
-from collections.abc import Mapping
-from typing import Any
-
 from experiments.shape_reconstruction.answer import ShapeAnswering
 from experiments.shape_reconstruction.dials import KNOBS, OWN
 from experiments.shape_reconstruction.explorer import performer, plan, smallest_error, steps_of
@@ -10,15 +7,9 @@ from experiments.shape_reconstruction.report import write
 from experiments.shape_reconstruction.result import lines_of, result_of, write_files
 from experiments.shape_reconstruction.section import ShapeRun
 from experiments.shape_reconstruction.table import MEASUREMENT, NAME
-from harness.experiment.experiment import Experiment, Scored
+from harness.experiment.experiment import Experiment
 from harness.experiment.plain import plain_budgets
 from harness.skills.exploring.exploration import PLAN_KEY
-
-
-def _sources(_scored: Scored) -> Mapping[str, Any]:
-    """Nothing: readings are simulated on an object that is known."""
-    return {}
-
 
 EXPERIMENT = Experiment(
     name=NAME,
@@ -31,7 +22,7 @@ EXPERIMENT = Experiment(
     answering=ShapeAnswering,
     result=result_of,
     lines=lines_of,
-    sources=_sources,
+    sources=lambda _scored: {},  # readings are simulated on an object that is known
     gives=(),
     report=write,
     files=write_files,

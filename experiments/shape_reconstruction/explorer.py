@@ -79,7 +79,12 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
             'an unknown object stands where its bottom is: set object.pose.anchor = "bottom", and its '
             "position to where its middle should be on the support"
         )
-    _require_library(scene.section(ShapeRun).library)
+    library = scene.section(ShapeRun).library
+    if library is not None and not Path(library).is_dir():
+        raise WrongUse(
+            f"[shape] library = {library!r}: there is no such folder; name one that holds meshes or "
+            "ObjectFiles, or leave the key out"
+        )
     if scene.section(ShapeRun).pcn is not None:
         raise WrongUse(
             "[shape] pcn adds rows to a table and is not used by a run; leave it out of the scene, or "
@@ -96,15 +101,6 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
     return Planned([*kinds(looks, 0), *presses], made.rehearsal, made.bench)
 
 
-def _require_library(folder: str | None) -> None:
-    """Before anything moves: the answer would find out after the last press."""
-    if folder is not None and not Path(folder).is_dir():
-        raise WrongUse(
-            f"[shape] library = {folder!r}: there is no such folder; name one that holds meshes or "
-            "ObjectFiles, or leave the key out"
-        )
-
-
 def performer(run: RunFiles, helpers: Helpers) -> Exploration:
     """Looks, then presses.
 
@@ -112,15 +108,12 @@ def performer(run: RunFiles, helpers: Helpers) -> Exploration:
         run: the folder.
         helpers: what a step may use beside the bench.
     """
-    enough = "the shape is known as well as was asked"
-    return Exploration(_explorer(run, helpers), helpers.ask, helpers.say, enough)
-
-
-def _explorer(run: RunFiles, helpers: Helpers) -> NextContact:
-    choose = run.scene.section(ShapeRun).choose
-    if choose == "planned":
-        return DrawnContacts(helpers.twin)
-    return ShapeExplorer(run, live_method(choose))
+    choose, enough = run.scene.section(ShapeRun).choose, "the shape is known as well as was asked"
+    planned = choose == "planned"
+    explorer: NextContact = (
+        DrawnContacts(helpers.twin) if planned else ShapeExplorer(run, live_method(choose))
+    )
+    return Exploration(explorer, helpers.ask, helpers.say, enough)
 
 
 DRAWN = 160

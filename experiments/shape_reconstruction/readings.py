@@ -100,7 +100,9 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
     stand_from_gel = seen.base_from_gel.copy()
     stand_from_gel[:3, 3] -= base_from_stand(run)[:3, 3]
     nothing = np.zeros((0, 3))
-    way = _way(run, record, seen.base_from_gel)
+    stand_off = np.asarray(record.step.parameters["base_from_stand_off"]) @ run.station.flange_from_gel
+    # From the stand-off to where the gel ended; the arm's noise makes no way shorter than none.
+    way = max(0.0, float(stand_off[:3, 2] @ (seen.base_from_gel[:3, 3] - stand_off[:3, 3])))
     longest = ContactMotion.from_parameters(record.step.parameters).longest(SPEEDS)
     return GuardedTouch(
         stand_from_gel=read_only(stand_from_gel),
@@ -113,12 +115,6 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
         clear=read_only(nothing if found is None else apply(stand_from_gel, found.clear)),
         stopped=way < longest - EARLY,
     )
-
-
-def _way(run: RunFiles, record: StepRecord, base_from_gel: FloatArray) -> float:
-    """M from the stand-off to where the gel ended; the arm's noise makes no way shorter than none."""
-    stand_off = np.asarray(record.step.parameters["base_from_stand_off"]) @ run.station.flange_from_gel
-    return max(0.0, float(stand_off[:3, 2] @ (base_from_gel[:3, 3] - stand_off[:3, 3])))
 
 
 def seen_mask(run: RunFiles, live: ByteArray, bare: ByteArray) -> SeenMask | None:

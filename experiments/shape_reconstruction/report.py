@@ -1,6 +1,6 @@
 """The pictures of a shape reconstruction's report: the surface found, what it rests on, and the truth."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +9,9 @@ from experiments.shape_reconstruction.answer import ShapeAnswer
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.metric import band_held, shape_error, surfaces_apart
 from experiments.shape_reconstruction.result import stem_of, true_surface
-from experiments.shape_reconstruction.running import LiveEstimate, live_estimates, live_method
+from experiments.shape_reconstruction.running import live_estimates, live_method
 from experiments.shape_reconstruction.section import ShapeRun
 from experiments.shape_reconstruction.surface import SEEN, TOUCHED, ShapeEstimate
-from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
 from harness.bench.device import Health
 from harness.experiment.compare import Comparison
@@ -34,71 +33,70 @@ _SAMPLES = 2000
 def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path) -> Path:
     """Draw the report; the path of its page."""
     folder.mkdir(parents=True, exist_ok=True)
-    sections = tuple(_sections(scored, Album(folder)))
-    return write_run_page(named(_NAME), scored, comparison, health, folder, sections)
-
-
-def _sections(scored: Scored, album: Album) -> Iterator[PageSection]:
+    album, truth = Album(folder), true_surface(scored.run, scored.truth)
     answer: ShapeAnswer = scored.found
-    yield _surface(scored, answer, album)
+    sections = [_surface(answer, truth, album)]
     if answer.evidence.touches:
-        yield _strip(scored, answer, album)
-    yield _cuts(scored, answer, album)
+        sections.append(_strip(scored, answer, truth, album))
+    figure = sections_figure(answer.fused.mesh, truth)
+    beside = "" if truth is None else ", and the true object by the same planes"
+    words = f"The surface cut by three planes through its middle{beside}."
+    sections.append(PageSection("Sections", words, album.drawing("sections", figure)))
     if answer.evidence.look is not None:
-        yield _seen(scored, answer, album)
+        sections.append(_seen(scored, answer, album))
+    return write_run_page(named(_NAME), scored, comparison, health, folder, tuple(sections))
 
 
-def _surface(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
-    found, truth = answer.fused, _truth(scored)
-    shown = _shown(found, answer.evidence)
+def _surface(answer: ShapeAnswer, truth: Mesh | None, album: Album) -> PageSection:
+    found, evidence = answer.fused, answer.evidence
+    shown = _shown(found, evidence)
+    ended, met = len(evidence.ended_by_housing), len(evidence.contacts)
+    nothing = len(evidence.distinct) - met - ended
+    touched, seen = (100.0 * float((found.known_by == source).mean()) for source in (TOUCHED, SEEN))
+    held = ""
+    if truth is not None:
+        apart = surfaces_apart(found.mesh, truth, _SAMPLES)
+        held = (
+            f"It is {1e3 * apart.error.chamfer:.1f} mm off the truth on average, which only a mocked run "
+            f"knows; {100.0 * band_held(found, apart).truth:.0f} % of the true surface lie within its 90 % "
+            "band. "
+        )
     words = (
-        f"By all readings: {_readings(answer.evidence)}. {_sources(found)} The colour is one standard "
-        f"deviation of the surface along its normal: the darker, the less sure. "
-        f"{'' if truth is None else _held(found, truth)}"
+        f"By all readings: {met} contact{'' if met == 1 else 's'} (white); dotted, {ended} "
+        f"way{'' if ended == 1 else 's'} that the sensor's housing ended, and {nothing} that met nothing. "
+        f"Of its vertices {touched:.0f} % lie under a contact and {seen:.0f} % at the silhouette's border; "
+        "all others are supposed. The colour is one standard deviation of the surface along its normal: the "
+        f"darker, the less sure. {held}"
         f"Beside result.json: {stem_of('fused')}.ply (deviation and source of each vertex), .obj, .glb, .npz."
     )
     picture = album.photograph("surface", surface_figure(shown))
     return PageSection("The surface", words, picture, turned_surface(shown))
 
 
-def _readings(evidence: ShapeEvidence) -> str:
-    ended, met = len(evidence.ended_by_housing), len(evidence.contacts)
-    contacts, ways = f"contact{'' if met == 1 else 's'}", f"way{'' if ended == 1 else 's'}"
-    nothing = len(evidence.distinct) - met - ended
-    return (
-        f"{met} {contacts} (white); dotted, {ended} {ways} that the sensor's housing ended, and "
-        f"{nothing} that met nothing"
-    )
-
-
-def _sources(found: ShapeEstimate) -> str:
-    touched, seen = (100.0 * float((found.known_by == source).mean()) for source in (TOUCHED, SEEN))
-    return (
-        f"Of its vertices {touched:.0f} % lie under a contact and {seen:.0f} % at the silhouette's border; "
-        "all others are supposed."
-    )
-
-
-def _held(found: ShapeEstimate, truth: Mesh) -> str:
-    apart = surfaces_apart(found.mesh, truth, _SAMPLES)
-    return (
-        f"It is {1e3 * apart.error.chamfer:.1f} mm off the truth on average, which only a mocked run knows; "
-        f"{100.0 * band_held(found, apart).truth:.0f} % of the true surface lie within its 90 % band. "
-    )
-
-
 def _shown(estimate: ShapeEstimate, evidence: ShapeEvidence) -> KnownSurface:
     """A surface with the readings that it is made of."""
     touches = evidence.touches
     contacts = np.array([touch.points.mean(axis=0) for touch in touches if touch.met]).reshape(-1, 3)
-    passed = [_way(touch.stand_from_gel, touch.way) for touch in touches if not touch.met]
+    passed = []
+    for touch in touches:
+        if not touch.met:
+            end, forward = touch.stand_from_gel[:3, 3], touch.stand_from_gel[:3, 2]
+            passed.append(np.array([end - touch.way * forward, end]))
     return KnownSurface(estimate.mesh, estimate.deviation, contacts, passed)
 
 
-def _strip(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
+def _strip(scored: Scored, answer: ShapeAnswer, truth: Mesh | None, album: Album) -> PageSection:
     method = live_method(scored.run.scene.section(ShapeRun).choose)
-    truth = _truth(scored)
-    found = [_then(live, truth) for live in live_estimates(answer.evidence, method)]
+    found = []
+    for live in live_estimates(answer.evidence, method):
+        title, estimate = f"press {live.presses}", live.estimate
+        if estimate is None:
+            found.append(SurfaceThen(title, "not enough for a surface", None))
+            continue
+        known = f"known to {1e3 * float(estimate.deviation.mean()):.1f} mm"
+        if truth is not None:
+            known += f", {1e3 * shape_error(estimate.mesh, truth, samples=_SAMPLES).chamfer:.1f} off"
+        found.append(SurfaceThen(title, known, _shown(estimate, live.evidence)))
     seen = "presses" if answer.evidence.look is None else "the picture and all presses"
     words = (
         f"The surface from {seen} until then, by the method that the arm waits for ({method}): how well it "
@@ -108,34 +106,6 @@ def _strip(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
     if all(one.shown is None for one in found):
         return PageSection("Press by press", f"{words} None of them said enough for a surface.")
     return PageSection("Press by press", words, album.photograph("strip", strip_figure(found)))
-
-
-def _then(live: LiveEstimate, truth: Mesh | None) -> SurfaceThen:
-    title, estimate = f"press {live.presses}", live.estimate
-    if estimate is None:
-        return SurfaceThen(title, "not enough for a surface", None)
-    words = f"known to {1e3 * float(estimate.deviation.mean()):.1f} mm"
-    if truth is not None:
-        words += f", {1e3 * shape_error(estimate.mesh, truth, samples=_SAMPLES).chamfer:.1f} off"
-    return SurfaceThen(title, words, _shown(estimate, live.evidence))
-
-
-def _truth(scored: Scored) -> Mesh | None:
-    return true_surface(scored.run, scored.truth)
-
-
-def _way(stand_from_gel: FloatArray, length: float) -> FloatArray:
-    """``(2, 3)`` m, from and to."""
-    end, forward = stand_from_gel[:3, 3], stand_from_gel[:3, 2]
-    return np.array([end - length * forward, end])
-
-
-def _cuts(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
-    truth = _truth(scored)
-    beside = "" if truth is None else ", and the true object by the same planes"
-    figure = sections_figure(answer.fused.mesh, truth)
-    words = f"The surface cut by three planes through its middle{beside}."
-    return PageSection("Sections", words, album.drawing("sections", figure))
 
 
 def _seen(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:

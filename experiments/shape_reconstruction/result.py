@@ -50,7 +50,9 @@ def result_of(scored: Scored) -> dict[str, Any]:
         if isinstance(one, ShapeEstimate):
             estimates[sense] = _estimate(sense, one, truth, answer.seconds[sense])
         else:
-            estimates[sense] = {**_nothing(), "seconds": answer.seconds.get(sense), "refused": str(one)}
+            names = (*ERRORS, "deviation_m", "extents_m", "touched", "seen", "not_bounded", "doubtful_m")
+            nothing: dict[str, Any] = dict.fromkeys((*names, "flags", "details", "mesh"))
+            estimates[sense] = {**nothing, "seconds": answer.seconds.get(sense), "refused": str(one)}
     fused = estimates["fused"]
     return {
         "error_m": fused["chamfer_m"],
@@ -69,8 +71,14 @@ def result_of(scored: Scored) -> dict[str, Any]:
 
 
 def _estimate(sense: str, found: ShapeEstimate, truth: Mesh | None, seconds: float) -> dict[str, Any]:
+    errors: dict[str, Any] = dict.fromkeys(ERRORS)
+    if truth is not None:
+        error = shape_error(found.mesh, truth)
+        points = published_chamfer(found.mesh, truth)
+        values = (error.chamfer, points, error.accuracy, error.completeness, error.f_score)
+        errors = dict(zip(ERRORS, values, strict=True))
     return {
-        **_errors(found, truth),
+        **errors,
         "deviation_m": float(found.deviation.mean()),
         "extents_m": np.ptp(found.mesh.bounds, axis=0).tolist(),
         "touched": float((found.known_by == TOUCHED).mean()),
@@ -83,20 +91,6 @@ def _estimate(sense: str, found: ShapeEstimate, truth: Mesh | None, seconds: flo
         "seconds": seconds,
         "refused": None,
     }
-
-
-def _nothing() -> dict[str, Any]:
-    names = (*ERRORS, "deviation_m", "extents_m", "touched", "seen", "not_bounded", "doubtful_m", "flags")
-    return dict.fromkeys((*names, "details", "mesh"))
-
-
-def _errors(found: ShapeEstimate, truth: Mesh | None) -> dict[str, Any]:
-    if truth is None:
-        return dict.fromkeys(ERRORS)
-    error = shape_error(found.mesh, truth)
-    points = published_chamfer(found.mesh, truth)
-    values = (error.chamfer, points, error.accuracy, error.completeness, error.f_score)
-    return dict(zip(ERRORS, values, strict=True))
 
 
 def stem_of(sense: str) -> str:
@@ -194,7 +188,14 @@ def write_estimate(estimate: ShapeEstimate, folder: Path, name: str = "shape") -
     Raises:
         DataRefused: numbers that are not finite or not one a vertex.
     """
-    _require_whole(estimate)
+    mesh, count = estimate.mesh, len(estimate.mesh.vertices)
+    finite = np.isfinite(mesh.vertices).all() and np.isfinite(estimate.deviation).all()
+    if len(mesh.faces) == 0 or not finite or not len(estimate.deviation) == len(estimate.known_by) == count:
+        raise DataRefused(
+            f"an answer of {len(mesh.faces)} faces and {count} vertices with {len(estimate.deviation)} "
+            f"deviations and {len(estimate.known_by)} sources is not written; give faces, and of every "
+            "vertex one finite deviation and one source"
+        )
     made = {
         "ply": ply_bytes_of(estimate),
         "obj": obj_bytes_of(estimate),
@@ -250,14 +251,16 @@ def points_bytes_of(estimate: ShapeEstimate) -> bytes:
     corners = estimate.mesh.faces[faces]
     nearest = np.linalg.norm(estimate.mesh.vertices[corners] - points[:, None], axis=2).argmin(axis=1)
     vertices = corners[np.arange(len(points)), nearest]
-    return _npz_bytes(
-        {
-            "points": points,
-            "normals": estimate.mesh.face_normals[faces],
-            "deviation": estimate.deviation[vertices],
-            "known_by": estimate.known_by[vertices].astype(np.float64),
-        }
+    stream = io.BytesIO()
+    np.savez(
+        stream,
+        allow_pickle=False,
+        points=points,
+        normals=estimate.mesh.face_normals[faces],
+        deviation=estimate.deviation[vertices],
+        known_by=estimate.known_by[vertices].astype(np.float64),
     )
+    return stream.getvalue()
 
 
 def colours_of(deviation: FloatArray) -> ByteArray:
@@ -266,21 +269,3 @@ def colours_of(deviation: FloatArray) -> ByteArray:
     steps = np.arange(len(_COLOURS))
     channels = [np.interp(at, steps, _COLOURS[:, channel]) for channel in range(3)]
     return np.round(np.column_stack(channels)).astype(np.uint8)
-
-
-def _npz_bytes(arrays: dict[str, FloatArray]) -> bytes:
-    stream = io.BytesIO()
-    np.savez(stream, allow_pickle=False, **arrays)
-    return stream.getvalue()
-
-
-def _require_whole(estimate: ShapeEstimate) -> None:
-    mesh = estimate.mesh
-    count = len(mesh.vertices)
-    finite = np.isfinite(mesh.vertices).all() and np.isfinite(estimate.deviation).all()
-    if len(mesh.faces) == 0 or not finite or not len(estimate.deviation) == len(estimate.known_by) == count:
-        raise DataRefused(
-            f"an answer of {len(mesh.faces)} faces and {count} vertices with {len(estimate.deviation)} "
-            f"deviations and {len(estimate.known_by)} sources is not written; give faces, and of every "
-            "vertex one finite deviation and one source"
-        )

@@ -8,9 +8,7 @@ import numpy as np
 
 from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.sound.peaks import Peaks, RingingModel, log_likelihood, modes_a_peak
-from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
-from harness.basics.materials import Material
 from harness.sim.modal.modes import dampings
 
 FEWEST = 3
@@ -118,8 +116,15 @@ class Hearing:
             stated: m/s, of the material as stated.
             size: by the other senses.
         """
-        about = [(one, _about(one, size)) for one in self.matches]
-        best, match = max(about, key=lambda pair: pair[0].log_evidence + _log_overlap(pair[0], size))
+        about = []
+        for one in self.matches:
+            # Where the match should lie if the other sense is right: of several sizes that fit, one is meant.
+            wide = np.hypot(one.sigma, size.spread)
+            prior = -0.5 * ((size.range.logs - np.log(size.size)) / wide) ** 2 - np.log(wide)
+            density = one.belief.log_density + prior
+            overlap = float(np.logaddexp.reduce(density))
+            about.append((one.log_evidence + overlap, one, Belief.of(size.range, density)))
+        _, best, match = max(about, key=lambda found: found[0])
         value = stated * best.speed * size.size / match.size
         sigma = float(np.sqrt(match.spread**2 + size.spread**2 + SHAPE_SIGMA**2))
         return {
@@ -151,24 +156,24 @@ def by_sound(peaks: Peaks, materials: Sequence[MaterialGuess], nominal: float, s
             "places"
         )
     matches = _matches(peaks, materials, nominal, sizes)
-    _require_worth(max(one.nats for one in matches))
+    nats = max(one.nats for one in matches)
+    if nats < WORTH:
+        raise FitRefused(
+            f"what was heard fits this object's modes at no size: {nats:.1f} nats a peak over chance, and "
+            f"{WORTH:g} are needed; check object and material, or strike more places"
+        )
     exact = _mixed(matches, [one.belief for one in matches])
-    _require_one(exact)
+    sure = exact.share_about(exact.likeliest, ALIKE)
+    if sure < SURE:
+        raise FitRefused(
+            f"what was heard fits this object's modes at several sizes, best at {1e2 * exact.likeliest:.1f} "
+            f"cm with {100 * sure:.0f} %, and {100 * SURE:.0f} % are needed; strike more places, "
+            "or say what it is made of"
+        )
     likeliest = max(range(len(matches)), key=lambda k: matches[k].log_evidence)
     _require_apart(peaks, materials[likeliest].model, nominal, exact.likeliest)
     belief = _mixed(matches, [one.belief.widened(one.sigma) for one in matches])
     return Hearing(belief, matches, time.perf_counter() - began)
-
-
-def log_ringing(peaks: Peaks, material: Material) -> float:
-    """Of how long the peaks ring, were the object of that material: their mean over the material's own.
-
-    At a heard frequency the damping is that of the material, whatever the size.
-    """
-    expected = dampings(peaks.frequencies, material)
-    apart = np.log(np.maximum(peaks.decays, 0.1 * expected) / expected)
-    sigma = np.hypot(DAMPING_SIGMA, PEAK_DAMPING_SIGMA / np.sqrt(len(apart)))
-    return float(-0.5 * (np.median(apart) / sigma) ** 2)
 
 
 def _matches(
@@ -187,7 +192,12 @@ def _matches(
     matches = []
     for guess, speed in zip(materials, speeds, strict=True):
         own = np.interp(logs - np.log(speed), few, likelihood)
-        evidence = float(np.logaddexp.reduce(TEMPER * own)) + log_ringing(peaks, guess.model.material)
+        # How long the peaks ring: at a heard frequency the damping is the material's, whatever the size.
+        expected = dampings(peaks.frequencies, guess.model.material)
+        longer = np.log(np.maximum(peaks.decays, 0.1 * expected) / expected)
+        spread = np.hypot(DAMPING_SIGMA, PEAK_DAMPING_SIGMA / np.sqrt(len(longer)))
+        ringing = float(-0.5 * (np.median(longer) / spread) ** 2)
+        evidence = float(np.logaddexp.reduce(TEMPER * own)) + ringing
         nats = float(own.max()) / len(peaks.frequencies)
         sigma = float(np.hypot(guess.sigma, SHAPE_SIGMA))
         matches.append(Match(Belief.of(sizes, TEMPER * own), evidence, sigma, float(speed), nats))
@@ -198,34 +208,6 @@ def _mixed(matches: Sequence[Match], beliefs: Sequence[Belief]) -> Belief:
     """Beliefs of the matches, each weighed by its material's evidence."""
     weighed = [one.log_evidence + belief.log_density for one, belief in zip(matches, beliefs, strict=True)]
     return Belief.of(beliefs[0].range, np.logaddexp.reduce(weighed, axis=0))
-
-
-def _require_worth(nats: float) -> None:
-    """Refuse peaks that the object's modes do not explain.
-
-    Raises:
-        FitRefused: at no size.
-    """
-    if nats < WORTH:
-        raise FitRefused(
-            f"what was heard fits this object's modes at no size: {nats:.1f} nats a peak over chance, and "
-            f"{WORTH:g} are needed; check object and material, or strike more places"
-        )
-
-
-def _require_one(exact: Belief) -> None:
-    """Refuse peaks that several sizes explain.
-
-    Raises:
-        FitRefused: one is not clearly the likeliest.
-    """
-    sure = exact.share_about(exact.likeliest, ALIKE)
-    if sure < SURE:
-        raise FitRefused(
-            f"what was heard fits this object's modes at several sizes, best at {1e2 * exact.likeliest:.1f} "
-            f"cm with {100 * sure:.0f} %, and {100 * SURE:.0f} % are needed; strike more places, "
-            "or say what it is made of"
-        )
 
 
 def _require_apart(peaks: Peaks, model: RingingModel, nominal: float, size: float) -> None:
@@ -240,18 +222,3 @@ def _require_apart(peaks: Peaks, model: RingingModel, nominal: float, size: floa
             f"{shared:.1f} modes share a peak of this object (limit {SHARED:g}): it is too soft or too thin "
             "for its modes to be told apart, and what was heard fits many sizes; look at it, or touch it"
         )
-
-
-def _prior(one: Match, size: Belief) -> FloatArray:
-    """``(n,)`` logarithm, not normalised: where the match should lie if another sense is right."""
-    sigma = np.hypot(one.sigma, size.spread)
-    return np.asarray(-0.5 * ((size.range.logs - np.log(size.size)) / sigma) ** 2 - np.log(sigma))
-
-
-def _about(one: Match, size: Belief) -> Belief:
-    """The match near a size that another sense knows: of several that fit, the one that is meant."""
-    return Belief.of(size.range, one.belief.log_density + _prior(one, size))
-
-
-def _log_overlap(one: Match, size: Belief) -> float:
-    return float(np.logaddexp.reduce(one.belief.log_density + _prior(one, size)))

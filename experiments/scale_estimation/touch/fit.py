@@ -336,12 +336,7 @@ def _in_stand(unknowns: FloatArray, places: FloatArray) -> tuple[FloatArray, Flo
     """``(k, c, m, 3)`` places ``(c, m, 3)`` as the standing object has them, and off its place in base."""
     moved = unknowns[:, [_X, _Y, _Z]]
     offset = places[None] - moved[:, None, None]
-    tilts = unknowns[:, None, None, _TILT_X], unknowns[:, None, None, _TILT_Y]
-    return np.einsum("kcmj,kji->kcmi", offset - _turned(tilts, offset), _turns(unknowns)), offset
-
-
-def _turned(tilts: tuple[FloatArray, FloatArray], places: FloatArray) -> FloatArray:
-    """``(k, c, m, 3)``: how far small turns about x and y move places."""
-    x, y, z = np.moveaxis(places, -1, 0)
-    about_x, about_y = tilts
-    return np.stack([about_y * z, -about_x * z, about_x * y - about_y * x], axis=-1)
+    tilt_x, tilt_y = unknowns[:, None, None, _TILT_X], unknowns[:, None, None, _TILT_Y]
+    x, y, z = np.moveaxis(offset, -1, 0)
+    tilted = np.stack([tilt_y * z, -tilt_x * z, tilt_x * y - tilt_y * x], axis=-1)
+    return np.einsum("kcmj,kji->kcmi", offset - tilted, _turns(unknowns)), offset

@@ -75,18 +75,14 @@ def patch_of(heights: FloatArray, pitch: float, base_from_gel: FloatArray) -> Pa
     across = (columns - 0.5 * (count[1] - 1)) * pitch
     along = (rows - 0.5 * (count[0] - 1)) * pitch
     in_gel = np.column_stack([across, along, -heights[rows, columns]])
-    normal = _normal(in_gel)
+    # Of the plane z = a x + b y + c through the places, towards the gel: -z.
+    terms = np.column_stack([in_gel[:, :2], np.ones(len(in_gel))])
+    slope = np.linalg.lstsq(terms, in_gel[:, 2], rcond=None)[0]
+    normal = np.array([slope[0], slope[1], -1.0])
+    normal /= np.linalg.norm(normal)
     chosen = in_gel[_spread(in_gel[:, :2], POINTS)]
     points, rotation = apply(base_from_gel, chosen), base_from_gel[:3, :3]
     return Patch(read_only(points), read_only(rotation @ normal), read_only(base_from_gel.copy()))
-
-
-def _normal(points: FloatArray) -> FloatArray:
-    """``(3,)`` unit towards the gel, -z, of the plane z = a x + b y + c through the points."""
-    terms = np.column_stack([points[:, :2], np.ones(len(points))])
-    slope = np.linalg.lstsq(terms, points[:, 2], rcond=None)[0]
-    normal = np.array([slope[0], slope[1], -1.0])
-    return np.asarray(normal / np.linalg.norm(normal))
 
 
 def _spread(places: FloatArray, count: int) -> list[int]:

@@ -153,7 +153,12 @@ def by_touch(
     scan = [_profile(rough, passed, found, costs, minima[apart[:followed]], logs, followed)]
     for k in apart:
         scan.append(_scanned(fine, minima[k], float(least[k] - misfits[k])))
-    belief = add_unevenness(Belief.of(sizes, -_least_of(np.vstack(scan), logs)))
+    rows = np.vstack(scan)
+    at, costs_at = rows[np.argsort(rows[:, 0])].T
+    at, first = np.unique(at, return_index=True)
+    # The least cost at each size: monotone between the places of the scan.
+    lowest = np.asarray(PchipInterpolator(at, costs_at[first])(logs))
+    belief = add_unevenness(Belief.of(sizes, -lowest))
     belief = belief.doubted(max(CHANCE ** (fine.places - 1), STRANGER if cost > DOUBTED else 0.0))
     return Touch(belief, minima[best], cost, time.perf_counter() - began, fine.places)
 
@@ -217,10 +222,3 @@ def _scanned(problem: TouchProblem, minimum: FloatArray, beside: float) -> Float
     starts[:, 0] += sigma * _FINE
     _, costs = problem.refined(starts, 6, fixed_size=True)
     return np.column_stack([starts[:, 0], costs + beside])
-
-
-def _least_of(scan: FloatArray, logs: FloatArray) -> FloatArray:
-    """``(n,)`` the least cost at each logarithm: the scan's lower envelope, monotone between its points."""
-    at, costs = scan[np.argsort(scan[:, 0])].T
-    at, first = np.unique(at, return_index=True)
-    return np.asarray(PchipInterpolator(at, costs[first])(logs))

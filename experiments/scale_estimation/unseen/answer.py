@@ -13,16 +13,16 @@ from experiments.scale_estimation.dials import TURNS
 from experiments.scale_estimation.size import Belief, SizeRange, fused
 from experiments.scale_estimation.touch.fit import USUAL_PLACE
 from experiments.scale_estimation.touch.patch import Patch
-from experiments.scale_estimation.unseen.contact_set import GelWay, distinct_ways
-from experiments.scale_estimation.unseen.network import by_imprints, by_strikes, by_ways, shipped
+from experiments.scale_estimation.unseen import spectrogram
+from experiments.scale_estimation.unseen.contact_set import GelWay, imprint_features
+from experiments.scale_estimation.unseen.network import by_ways, shipped
 from experiments.scale_estimation.unseen.regression import by_outline, features_of
-from experiments.scale_estimation.unseen.spectrogram import response_of
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.materials import Material
 from harness.bench.acquisition import Strike
 from harness.bench.station_sections import CameraSection
-from harness.experiment.repeated_readings import PlaceTolerance
+from harness.experiment.repeated_readings import PlaceTolerance, group_by_place
 from harness.picture.outline import SeenOutline
 
 NOVEL_SIGMA = 0.35
@@ -84,10 +84,11 @@ def strikes_alone(strikes: Sequence[Strike], material: Material, sizes: SizeRang
     Raises:
         FitRefused: no strike may be used.
     """
-    heard = response_of(strikes)
+    heard = spectrogram.response_of(strikes)
     if heard is None:
         raise FitRefused("nothing was heard: no strike was made, or none rang; strike the object")
-    return ShapelessAnswer(*by_strikes(*heard, material, sizes))
+    bands, extras = spectrogram.features(*heard, material)
+    return ShapelessAnswer(*shipped("sound").belief([{"bands": bands, "extras": extras}], sizes))
 
 
 def ways_alone(
@@ -109,7 +110,10 @@ def ways_alone(
     """
     if all(way.normal is None for way in ways):
         raise FitRefused("the gel touched nothing yet")
-    belief, distance = by_ways(distinct_ways(ways, same_place), sizes, turns)
+    lines = np.array([(way.end, way.direction) for way in ways]).reshape(-1, 2, 3)
+    places = group_by_place(lines[:, 0], lines[:, 1], same_place)
+    distinct = [ways[k] for k in np.unique(places, return_index=True)[1]]
+    belief, distance = by_ways(distinct, sizes, turns)
     # Farther off than usual, the network has given an even density its share already.
     novel = NOVEL_SIGMA * min(distance, 1.0)
     return ShapelessAnswer(belief.widened(float(np.hypot(shape_sigma("touch"), novel))), distance)
@@ -136,14 +140,9 @@ def imprints_alone(patches: Sequence[Patch], sizes: SizeRange) -> ShapelessAnswe
     """
     if not patches:
         raise FitRefused("the gel touched nothing yet")
-    return ShapelessAnswer(*by_imprints([patch.points for patch in patches], sizes))
-
-
-def load_networks(sound: bool, touch: bool) -> None:
-    """Read what the senses will need."""
-    for sense, asked in (("sound", sound), ("touch", touch)):
-        if asked:
-            shipped(sense)
+    rows, kinds, whole = imprint_features([patch.points for patch in patches])
+    inputs = {"ways": rows, "kinds": kinds, "whole": whole}
+    return ShapelessAnswer(*shipped("imprints").belief([inputs], sizes))
 
 
 WRITTEN = "data/real_shapes.json"

@@ -7,7 +7,6 @@ import numpy as np
 
 from experiments.scale_estimation.touch.patch import Patch
 from harness.basics.arrays import FloatArray
-from harness.experiment.repeated_readings import PlaceTolerance, group_by_place
 
 MOST = 16
 """Ways that are looked at; of more, the first."""
@@ -57,19 +56,6 @@ class GelWay:
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         normal = None if self.normal is None else turn @ self.normal
         return GelWay(turn @ self.end, turn @ self.direction, normal)
-
-
-def distinct_ways(ways: Sequence[GelWay], tolerance: PlaceTolerance) -> list[GelWay]:
-    """Keep the first of the paths that lead along one line to one place.
-
-    Args:
-        ways: paths of one exploration.
-        tolerance: largest differences between two paths to one place.
-    """
-    lines = np.array([(way.end, way.direction) for way in ways]).reshape(-1, 2, 3)
-    places = group_by_place(lines[:, 0], lines[:, 1], tolerance)
-    first = np.unique(places, return_index=True)[1]
-    return [ways[k] for k in first]
 
 
 def features(ways: Sequence[GelWay]) -> tuple[FloatArray, FloatArray, FloatArray]:

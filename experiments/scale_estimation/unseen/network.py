@@ -12,7 +12,6 @@ from experiments.scale_estimation.dials import TURNS
 from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.unseen import contact_set, spectrogram
 from harness.basics.arrays import FloatArray, read_only
-from harness.basics.materials import Material
 from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.runtime import Network
 
@@ -86,24 +85,11 @@ class SizeNetwork:
         distance = float(np.mean(distances)) / self.family.usual
         strange = max(UNKNOWN_SHARE, 1.0 - 1.0 / distance**2 if distance > 1.0 else 0.0)
         log_density = np.interp(sizes.logs, MIDDLES, np.log(np.mean(shares, axis=0) + 1e-12))
-        return _in_range(sizes, Belief.of(sizes, log_density), strange), distance
-
-
-def _in_range(sizes: SizeRange, belief: Belief, strange: float) -> Belief:
-    """With a share spread evenly over the range alone: beyond it nothing was learnt."""
-    inside = sizes.possible.astype(bool)
-    even = np.where(inside, 1.0, 0.0)
-    density = np.exp(belief.log_density)
-    mixed = (1.0 - strange) * density / density.sum() + strange * even / even.sum()
-    return Belief.of(sizes, np.log(np.maximum(mixed, 1e-300)))
-
-
-def by_strikes(
-    responses: FloatArray, rate: float, band: tuple[float, float], material: Material, sizes: SizeRange
-) -> tuple[Belief, float]:
-    """What impulse responses (``spectrogram.response_of``) say, and how far they are from the family."""
-    bands, extras = spectrogram.features(responses, rate, band, material)
-    return shipped("sound").belief([{"bands": bands, "extras": extras}], sizes)
+        density = np.exp(Belief.of(sizes, log_density).log_density)
+        # The even share is spread over the range alone: beyond it nothing was learnt.
+        even = np.where(sizes.possible.astype(bool), 1.0, 0.0)
+        mixed = (1.0 - strange) * density / density.sum() + strange * even / even.sum()
+        return Belief.of(sizes, np.log(np.maximum(mixed, 1e-300))), distance
 
 
 def by_ways(
@@ -121,12 +107,6 @@ def by_ways(
         rows, kinds, whole = contact_set.features([way.turned(float(yaw)) for way in ways])
         views.append({"ways": rows, "kinds": kinds, "whole": whole})
     return shipped("touch").belief(views, sizes)
-
-
-def by_imprints(imprints: Sequence[FloatArray], sizes: SizeRange) -> tuple[Belief, float]:
-    """What imprints without poses say, ``(n, 3)`` m each, and how far they are from the family."""
-    rows, kinds, whole = contact_set.imprint_features(imprints)
-    return shipped("imprints").belief([{"ways": rows, "kinds": kinds, "whole": whole}], sizes)
 
 
 INPUTS: Mapping[str, tuple[tuple[str, tuple[int, ...]], ...]] = {

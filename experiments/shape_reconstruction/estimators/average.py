@@ -58,22 +58,18 @@ def by_average(evidence: ShapeEvidence) -> ShapeEstimate:
 def mean_occupancy() -> FloatArray:
     """``(corners,)`` of a grid over the unit cube on the support: share of shapes with matter there."""
     names, random = list(FAMILIES), np.random.default_rng(_SEED)
+    pitch = 1.0 / (_CORNERS - 1)
+    low = np.array([-0.5, -0.5]) + pitch * np.array([1.1e-4, 1.7e-4])
+    sides = np.array([_CORNERS, _CORNERS])
     total = np.zeros((_CORNERS,) * 3)
     for number in range(SHAPES):
         surface = draw(names[number % len(names)], random).surface
         turn = rotation_about(np.array([0.0, 0.0, 1.0]), random.uniform(0.0, 2.0 * np.pi))
-        total += _occupied(surface.vertices @ turn.T, surface)
+        corners = (surface.vertices @ turn.T)[surface.faces]
+        line, height, sign = column_crossings(corners, low, np.array([pitch, pitch]), sides)
+        above = np.zeros((_CORNERS**2, _CORNERS + 1))
+        level = np.clip(np.ceil(height / pitch).astype(np.int64), 0, _CORNERS)
+        np.add.at(above, (line, level), sign)
+        winding = above.sum(axis=1, keepdims=True) - np.cumsum(above, axis=1)
+        total += winding[:, :_CORNERS].reshape((_CORNERS,) * 3) >= 1.0
     return read_only((total / SHAPES).ravel())
-
-
-def _occupied(vertices: FloatArray, surface: Mesh) -> FloatArray:
-    """``(n, n, n)`` of 1 where a body one long has matter."""
-    pitch = 1.0 / (_CORNERS - 1)
-    low = np.array([-0.5, -0.5]) + pitch * np.array([1.1e-4, 1.7e-4])
-    sides = np.array([_CORNERS, _CORNERS])
-    line, height, sign = column_crossings(vertices[surface.faces], low, np.array([pitch, pitch]), sides)
-    above = np.zeros((_CORNERS**2, _CORNERS + 1))
-    level = np.clip(np.ceil(height / pitch).astype(np.int64), 0, _CORNERS)
-    np.add.at(above, (line, level), sign)
-    winding = above.sum(axis=1, keepdims=True) - np.cumsum(above, axis=1)
-    return np.asarray(winding[:, :_CORNERS].reshape((_CORNERS,) * 3) >= 1.0, dtype=np.float64)

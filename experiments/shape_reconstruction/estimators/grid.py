@@ -136,7 +136,8 @@ def extract_body(
         on_piece = _count_contacts(labels, count, origin, pitch, contacts)
         field, notes = _join(field, pitch, labels, on_piece)
         inside = field < -INSIDE * pitch
-    cavity = _fill(inside) & ~inside
+    filled = ndimage.binary_fill_holes(np.pad(inside, 1, constant_values=False))[1:-1, 1:-1, 1:-1]
+    cavity = filled & ~inside
     if cavity.any():
         field = np.where(cavity, -_BRIDGE * pitch, field)
     # Corners too near to zero to be counted as inside must not become pieces of their own.
@@ -189,9 +190,3 @@ def _bridge(cells: FloatArray, body: BoolArray, piece: BoolArray) -> BoolArray:
     path = np.zeros(cells.shape, bool)
     path[tuple(np.array(costs.traceback(tuple(int(k) for k in end))).T)] = True
     return np.asarray(ndimage.binary_dilation(path, np.ones((3, 3, 3), bool)))
-
-
-def _fill(inside: BoolArray) -> BoolArray:
-    """The corners inside, and those that no path of corners outside leads to."""
-    padded = np.pad(inside, 1, constant_values=False)
-    return np.asarray(ndimage.binary_fill_holes(padded)[1:-1, 1:-1, 1:-1])

@@ -113,7 +113,10 @@ def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> ShapeEstimate
     samples = thinned(whole)
     silhouette = silhouette_of(evidence, samples.points)
     axis = find_revolution(samples) if symmetric else None
-    data = _contact_data(samples)
+    normal_sigmas = np.maximum(samples.normal_sigmas, _NORMAL)
+    data = SurfaceData(
+        samples.points, np.zeros(len(samples.points)), samples.sigmas, samples.normals, normal_sigmas
+    )
     low, high = _box(data.points, evidence.largest)
     by_contacts = field = fitted(data, low, high)
     left_out = predict_by_field(evidence, by_contacts)
@@ -164,13 +167,19 @@ def _finished(fit: _Fit, mesh: Mesh, start: float) -> ShapeEstimate:
     sides = limited_sides(mesh, fit.samples, fit.silhouette)
     beyond = beyond_deviation(mesh, known, sides, fit.evidence.largest)
     hollow = hollow_deviation(mesh, known, fit.samples)
+    some = np.random.default_rng(0).permutation(len(mesh.vertices))[:_SOME]
+    deviations = fit.field.deviations(mesh.vertices[some])
+    # The other vertices are as the nearest three of those.
+    apart, near = (np.asarray(one) for one in cKDTree(mesh.vertices[some]).query(mesh.vertices, k=[1, 2, 3]))
+    share = 1.0 / (apart + 1e-6)
+    smooth = np.asarray((share * deviations[near]).sum(axis=1) / share.sum(axis=1))
     round_ = "supposed to be round about a vertical axis, as its contacts are" if fit.axis else ""
     open_ = (
         "may be hollow: its top was touched nowhere near its middle" if (hollow > 0.0).mean() > _MOUTH else ""
     )
     return ShapeEstimate(
         mesh=mesh,
-        deviation=np.sqrt(_deviations(fit.field, mesh) ** 2 + READING**2 + beyond**2 + hollow**2),
+        deviation=np.sqrt(smooth**2 + READING**2 + beyond**2 + hollow**2),
         known_by=known,
         not_bounded=not_bounded(sides),
         doubtful=fit.left_out.outliers,
@@ -183,17 +192,6 @@ def _finished(fit: _Fit, mesh: Mesh, start: float) -> ShapeEstimate:
             "left_out_m": fit.left_out.errors.tolist(),
             "axis_m": None if fit.axis is None else [float(value) for value in fit.axis.centre],
         },
-    )
-
-
-def _contact_data(samples: ContactSamples) -> SurfaceData:
-    count = len(samples.points)
-    return SurfaceData(
-        samples.points,
-        np.zeros(count),
-        samples.sigmas,
-        samples.normals,
-        np.maximum(samples.normal_sigmas, _NORMAL),
     )
 
 
@@ -248,15 +246,6 @@ def _outside_hull(of: FloatArray, points: FloatArray) -> FloatArray:
     return beyond
 
 
-def _deviations(field: ThinPlateField, mesh: Mesh) -> FloatArray:
-    """``(vertices,)`` m: of some vertices, the others as the nearest three of them."""
-    some = np.random.default_rng(0).permutation(len(mesh.vertices))[:_SOME]
-    found = field.deviations(mesh.vertices[some])
-    apart, near = (np.asarray(one) for one in cKDTree(mesh.vertices[some]).query(mesh.vertices, k=[1, 2, 3]))
-    share = 1.0 / (apart + 1e-6)
-    return np.asarray((share * found[near]).sum(axis=1) / share.sum(axis=1))
-
-
 RAYS = 60
 """Along the whole border, evenly."""
 
@@ -292,9 +281,11 @@ def rim_data(
     middle = 0.5 * np.array(silhouette.look.mask.shape[::-1])
     in_camera = (pixels - middle - silhouette.shift) / silhouette.look.focal_length
     rays = np.column_stack([in_camera, np.ones(len(in_camera))]) @ pose[:3, :3].T
-    corners = np.array([[low, high][k][i] for k in (0, 1) for i in range(3)]).reshape(2, 3)
-    nearest, farthest = _depths(corners, origin, pose[:3, 2])
-    depths = np.linspace(nearest, farthest, _DEPTHS)
+    corners = np.array(
+        [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    )
+    deep = (corners - origin) @ pose[:3, 2]
+    depths = np.linspace(float(deep.min()), float(deep.max()), _DEPTHS)
     along = origin + depths[None, :, None] * rays[:, None]
     inside = ((along >= low) & (along <= high)).all(axis=2)
     values = np.where(inside, field(along.reshape(-1, 3)).reshape(inside.shape), np.inf)
@@ -326,15 +317,6 @@ def _border(silhouette: Silhouette) -> tuple[FloatArray, FloatArray]:
     return np.column_stack([columns + 0.5, rows + 0.5])[some], outward[some]
 
 
-def _depths(corners: FloatArray, origin: FloatArray, axis: FloatArray) -> tuple[float, float]:
-    """M along the optical axis between which the box with two such corners is."""
-    picked = np.array(
-        [[corners[i, 0], corners[j, 1], corners[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-    )
-    along = (picked - origin) @ axis
-    return float(along.min()), float(along.max())
-
-
 DOUBTFUL = 4.0
 """Standard deviations between a contact and its prediction above which it is an outlier."""
 
@@ -351,22 +333,18 @@ def predict_by_field(evidence: ShapeEvidence, field: ThinPlateField) -> LeftOut:
     count = 4 * len(field.data.points)
     inverse = cho_solve((field.factor, True), np.eye(count), check_finite=False)
     errors, found = np.zeros(len(evidence.contacts)), {}
-    for k, contact in enumerate(evidence.contacts):
-        rows = _rows_of(contact.points, field)
+    for number, contact in enumerate(evidence.contacts):
+        apart = ((field.data.points[:, None] - contact.points[None]) ** 2).sum(axis=2).min(axis=1)
+        # Numbers of the values and gradients that are this contact's.
+        rows = [4 * int(k) + i for k in np.nonzero(apart < _SAME_PLACE)[0] for i in range(4)]
         if len(rows) == 0:
             continue
         block = np.linalg.inv(inverse[np.ix_(rows, rows)])
         off = block @ field.weights.ravel()[rows]
         values = slice(0, None, 4)
-        errors[k] = field.reach * float(np.sqrt(np.mean(off[values] ** 2)))
+        errors[number] = field.reach * float(np.sqrt(np.mean(off[values] ** 2)))
         mean = float(off[values].mean())
         sigma = float(np.sqrt(block[values, values].mean()))
         if abs(mean) > DOUBTFUL * sigma:
             found[contact.index] = abs(mean) * field.reach
     return LeftOut(errors, found)
-
-
-def _rows_of(points: FloatArray, field: ThinPlateField) -> list[int]:
-    """Numbers of the values and gradients that are a contact's."""
-    apart = ((field.data.points[:, None] - points[None]) ** 2).sum(axis=2).min(axis=1)
-    return [4 * int(k) + i for k in np.nonzero(apart < _SAME_PLACE)[0] for i in range(4)]

@@ -46,6 +46,11 @@ def limited_sides(mesh: Mesh, samples: ContactSamples | None, silhouette: Silhou
     low, high = mesh.bounds
     sides: Sides = {}
     for axis, name in enumerate("xyz"):
+        across = False
+        if silhouette is not None:
+            mask, towards = silhouette.look.mask, float(silhouette.look.stand_from_camera[axis, 2])
+            cut_off = bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())
+            across = not cut_off and abs(towards) < _TOWARDS_CAMERA
         for sign in (-1, 1):
             end = high[axis] if sign > 0 else low[axis]
             near = _NEAR_END * (high[axis] - low[axis])
@@ -55,17 +60,8 @@ def limited_sides(mesh: Mesh, samples: ContactSamples | None, silhouette: Silhou
                     & (np.abs(samples.points[:, axis] - end) < near)
                 ).any()
             )
-            sides[name, sign] = touched or _limited_by_picture(silhouette, axis) or (name, sign) == ("z", -1)
+            sides[name, sign] = touched or across or (name, sign) == ("z", -1)
     return sides
-
-
-def _limited_by_picture(silhouette: Silhouette | None, axis: int) -> bool:
-    if silhouette is None:
-        return False
-    mask = silhouette.look.mask
-    cut_off = bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())
-    towards = abs(float(silhouette.look.stand_from_camera[axis, 2]))
-    return not cut_off and towards < _TOWARDS_CAMERA
 
 
 def not_bounded(sides: Sides) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from experiments.shape_reconstruction.estimators.contact_samples import ContactSamples
 from experiments.shape_reconstruction.estimators.free_space import sensor_depth
-from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
+from experiments.shape_reconstruction.evidence import ShapeEvidence
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.geometry import rotation_about
 
@@ -86,7 +86,10 @@ def find_revolution(samples: ContactSamples, seed: int = 0) -> Revolution | None
         return None
     centre = _best_centre(samples.of(np.sort(some)))
     upright = samples.of(side)
-    radial, off = _radial(upright, centre), _median_errors(upright, centre)
+    radial = _aside(upright, centre) < RADIAL
+    pairs = zip(*_profile_errors(upright, centre), strict=True)
+    # The median of how far each place is off its partners' profile, m; infinite without a partner.
+    off = np.array([float(np.median(far[each])) if each.any() else np.inf for each, far in pairs])
     paired = np.isfinite(off)
     if paired.sum() < PLACES or len(np.unique(upright.touches[paired])) < TOUCHES:
         return None
@@ -95,15 +98,11 @@ def find_revolution(samples: ContactSamples, seed: int = 0) -> Revolution | None
     agreeing = float((radial & (off < OFF))[paired].mean())
     of_body = np.ones(len(samples.points), dtype=bool)
     of_body[side] = radial & ~(off >= OFF)
-    believed = share >= SHARE and agreeing >= AGREEING and _widest_gap(upright, radial, centre) <= OPEN
-    return Revolution(centre, share, of_body) if believed else None
-
-
-def _widest_gap(side: ContactSamples, radial: BoolArray, centre: FloatArray) -> float:
-    """Rad around an axis between neighbouring places whose normals meet it."""
-    out = side.points[radial, :2] - centre
+    out = upright.points[radial, :2] - centre
     angles = np.sort(np.arctan2(out[:, 1], out[:, 0]))
-    return float(np.diff(angles, append=angles[:1] + 2.0 * np.pi).max(initial=0.0))
+    gap = float(np.diff(angles, append=angles[:1] + 2.0 * np.pi).max(initial=0.0))
+    believed = share >= SHARE and agreeing >= AGREEING and gap <= OPEN
+    return Revolution(centre, share, of_body) if believed else None
 
 
 def _best_centre(side: ContactSamples) -> FloatArray:
@@ -112,27 +111,20 @@ def _best_centre(side: ContactSamples) -> FloatArray:
     axes = (np.arange(low[k], high[k], _STEPS[0]) for k in (0, 1))
     grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
     costs = np.array([_normals_cost(side, centre) for centre in grid])
-    found = [_refined(side, grid[k]) for k in _lowest_apart(grid, costs)]
-    return min(found, key=lambda centre: _cost(side, centre))
-
-
-def _lowest_apart(grid: FloatArray, costs: FloatArray) -> list[int]:
-    """Numbers of the lowest, none next to another."""
-    chosen: list[int] = []
+    chosen: list[int] = []  # the lowest, none next to another
     for k in np.argsort(costs):
         if len(chosen) == _FIRST:
             break
         if all(np.abs(grid[k] - grid[other]).max() > 1.5 * _STEPS[0] for other in chosen):
             chosen.append(int(k))
-    return chosen
-
-
-def _refined(side: ContactSamples, centre: FloatArray) -> FloatArray:
-    for step in _STEPS[1:]:
-        steps = step * np.arange(-3, 4)
-        tried = centre + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-        centre = tried[int(np.argmin([_cost(side, each) for each in tried]))]
-    return centre
+    found = []
+    for centre in grid[chosen]:
+        for step in _STEPS[1:]:
+            steps = step * np.arange(-3, 4)
+            tried = centre + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+            centre = tried[int(np.argmin([_cost(side, each) for each in tried]))]
+        found.append(centre)
+    return min(found, key=lambda centre: _cost(side, centre))
 
 
 def _cost(side: ContactSamples, centre: FloatArray) -> float:
@@ -146,10 +138,6 @@ def _cost(side: ContactSamples, centre: FloatArray) -> float:
 def _normals_cost(side: ContactSamples, centre: FloatArray) -> float:
     horizontal = np.linalg.norm(side.normals[:, :2], axis=1)
     return float((horizontal * np.minimum(_aside(side, centre) / RADIAL, 1.0) ** 2).sum())
-
-
-def _radial(side: ContactSamples, centre: FloatArray) -> BoolArray:
-    return np.asarray(_aside(side, centre) < RADIAL)
 
 
 def _aside(side: ContactSamples, centre: FloatArray) -> FloatArray:
@@ -177,12 +165,6 @@ def _profile_errors(side: ContactSamples, centre: FloatArray) -> tuple[BoolArray
     partners &= np.linalg.norm(side.points[:, None, :2] - side.points[None, :, :2], axis=2) > _AROUND
     off = np.abs((chords * mean).sum(axis=2)) / np.maximum(np.linalg.norm(mean, axis=2), 1e-9)
     return partners, off
-
-
-def _median_errors(side: ContactSamples, centre: FloatArray) -> FloatArray:
-    """``(n,)`` m, the median of how far each place is off its partners' profile; infinite without any."""
-    rows = zip(*_profile_errors(side, centre), strict=True)
-    return np.array([float(np.median(off[each])) if each.any() else np.inf for each, off in rows])
 
 
 SLACK = 4.0e-3
@@ -222,27 +204,17 @@ def turned_room(axis: Revolution, samples: ContactSamples, evidence: ShapeEviden
     is left out: it came down beside a handle, or on one.
     """
     top = float(samples.points[:, 2].max())
-    found = None
-    for touch in evidence.touches:
-        if _is_downward(touch) and touch.stand_from_gel[2, 3] < top - BELOW:
-            room = _room_of(touch, axis, samples, evidence)
-            if room.at(samples.points).max() <= SLACK:
-                found = room if found is None else replace(found, depth=np.maximum(found.depth, room.depth))
-    return found
-
-
-def _is_downward(touch: GuardedTouch) -> bool:
-    return bool(touch.stand_from_gel[2, 2] < -_DOWNWARD)
-
-
-def _room_of(
-    touch: GuardedTouch, axis: Revolution, samples: ContactSamples, evidence: ShapeEvidence
-) -> TurnedRoom:
     out = np.linalg.norm(samples.points[:, :2] - axis.centre, axis=1).max()
     radii = np.arange(0.0, out + _ROOM_MARGIN, PITCH)
     heights = np.arange(0.0, samples.points[:, 2].max() + _ROOM_MARGIN, PITCH)
     angles = 2.0 * np.pi * np.arange(ANGLES) / ANGLES
     r, z, turn = np.meshgrid(radii, heights, angles, indexing="ij")
     places = np.stack([axis.centre[0] + r * np.cos(turn), axis.centre[1] + r * np.sin(turn), z], axis=-1)
-    deep = sensor_depth(replace(evidence, touches=(touch,)), places.reshape(-1, 3))
-    return TurnedRoom(axis.centre, np.asarray(deep.reshape(r.shape).max(axis=2)))
+    found = None
+    for touch in evidence.touches:
+        if touch.stand_from_gel[2, 2] < -_DOWNWARD and touch.stand_from_gel[2, 3] < top - BELOW:
+            deep = sensor_depth(replace(evidence, touches=(touch,)), places.reshape(-1, 3))
+            room = TurnedRoom(axis.centre, np.asarray(deep.reshape(r.shape).max(axis=2)))
+            if room.at(samples.points).max() <= SLACK:
+                found = room if found is None else replace(found, depth=np.maximum(found.depth, room.depth))
+    return found

@@ -40,8 +40,23 @@ def require_stated_space(evidence: ShapeEvidence) -> None:
     """
     if evidence.look is not None and evidence.look.mask.any():
         _require_outline(evidence, evidence.look)
-    if evidence.contacts:
-        _require_contacts(evidence, np.concatenate([touch.points for touch in evidence.contacts]))
+    if not evidence.contacts:
+        return
+    points = np.concatenate([touch.points for touch in evidence.contacts])
+    reach = evidence.largest / np.sqrt(2.0) + PLACE_ERRORS * evidence.place_error
+    off = float(np.linalg.norm(points[:, :2], axis=1).max())
+    longest = longest_side(points)
+    if off > reach:
+        raise FitRefused(
+            f"a press met something {off:.2f} m from the stated place; with [shape] place_error "
+            f"{evidence.place_error * 1e3:g} mm and largest {evidence.largest:g} m the object ends within "
+            f"{reach:.2f} m; correct object.pose.position or these two"
+        )
+    if longest > TOO_LONG * evidence.largest:
+        raise FitRefused(
+            f"contacts are {longest:.2f} m apart, and [shape] largest is {evidence.largest:g} m; raise "
+            "largest, or check whether the presses met one object"
+        )
 
 
 def require_stated_size(mesh: Mesh, evidence: ShapeEvidence, method: str) -> None:
@@ -78,42 +93,20 @@ def longest_side(points: FloatArray) -> float:
 
 def _require_outline(evidence: ShapeEvidence, look: SeenMask) -> None:
     """Compare the place where the filled silhouette meets the support with the stated place."""
-    off, limit = _outline_offset(look), max_offset(evidence)
+    rows, columns = np.nonzero(look.mask)
+    height, width = look.mask.shape
+    pixels = np.column_stack([columns + 0.5 - 0.5 * width, rows + 0.5 - 0.5 * height]) / look.focal_length
+    rays = np.column_stack([pixels, np.ones(len(pixels))]) @ look.stand_from_camera[:3, :3].T
+    eye = look.stand_from_camera[:3, 3]
+    down, off = rays[:, 2] < -_HORIZON, _FAR
+    if eye[2] > 0.0 and down.any():
+        feet = eye[:2] - (eye[2] / rays[down, 2])[:, None] * rays[down, :2]
+        off = min(float(np.linalg.norm(feet, axis=1).min()), _FAR)
+    limit = max_offset(evidence)
     if off > limit:
         seen = "above the horizon" if off >= _FAR else f"{off:.2f} m from the stated place at the nearest"
         raise FitRefused(
             f"in the picture the object stands {seen}; with [shape] place_error "
             f"{evidence.place_error * 1e3:g} mm and largest {evidence.largest:g} m it must be within "
             f"{limit:.2f} m; correct object.pose.position or these two, or check the camera's pose"
-        )
-
-
-def _outline_offset(look: SeenMask) -> float:
-    """Least distance from the stated place to where rays of the silhouette meet the support, m."""
-    rows, columns = np.nonzero(look.mask)
-    height, width = look.mask.shape
-    pixels = np.column_stack([columns + 0.5 - 0.5 * width, rows + 0.5 - 0.5 * height]) / look.focal_length
-    rays = np.column_stack([pixels, np.ones(len(pixels))]) @ look.stand_from_camera[:3, :3].T
-    eye = look.stand_from_camera[:3, 3]
-    down = rays[:, 2] < -_HORIZON
-    if eye[2] <= 0.0 or not down.any():
-        return _FAR
-    feet = eye[:2] - (eye[2] / rays[down, 2])[:, None] * rays[down, :2]
-    return min(float(np.linalg.norm(feet, axis=1).min()), _FAR)
-
-
-def _require_contacts(evidence: ShapeEvidence, points: FloatArray) -> None:
-    reach = evidence.largest / np.sqrt(2.0) + PLACE_ERRORS * evidence.place_error
-    off = float(np.linalg.norm(points[:, :2], axis=1).max())
-    longest = longest_side(points)
-    if off > reach:
-        raise FitRefused(
-            f"a press met something {off:.2f} m from the stated place; with [shape] place_error "
-            f"{evidence.place_error * 1e3:g} mm and largest {evidence.largest:g} m the object ends within "
-            f"{reach:.2f} m; correct object.pose.position or these two"
-        )
-    if longest > TOO_LONG * evidence.largest:
-        raise FitRefused(
-            f"contacts are {longest:.2f} m apart, and [shape] largest is {evidence.largest:g} m; raise "
-            "largest, or check whether the presses met one object"
         )

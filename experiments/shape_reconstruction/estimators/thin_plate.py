@@ -85,7 +85,7 @@ class ThinPlateField:
 
     def deviations(self, points: FloatArray) -> FloatArray:
         """``(m,)`` m: one standard deviation of the field at ``(m, 3)`` points."""
-        between = self.amplitude * _cross(self._local(points), self._local(self.data.points))
+        between = self.amplitude * _covariances(self._local(points), self._local(self.data.points), 1)
         solved = solve_triangular(self.factor, between.T, lower=True, check_finite=False)
         variance = self.amplitude - np.einsum("ij,ij->j", solved, solved)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)) * self.reach)
@@ -109,7 +109,7 @@ def fitted(
     centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     reach = WIDER * 2.0 * float(np.linalg.norm(corners - centre, axis=1).max())
     local = np.ascontiguousarray((data.points - centre) / reach)
-    prior = _cross(local, local, gradients=True)
+    prior = _covariances(local, local, 4)
     observed = np.column_stack([data.values / reach, data.normals]).ravel()
     noise = (
         np.column_stack([data.sigmas / reach, np.repeat(data.normal_sigmas[:, None], 3, axis=1)]).ravel() ** 2
@@ -117,35 +117,28 @@ def fitted(
     kept = np.isfinite(noise)
     noise[~kept], observed[~kept] = 1.0, 0.0
     prior[~kept], prior[:, ~kept] = 0.0, 0.0  # what is not observed weighs nothing
-    tried = [a * UNIT for a in _AMPLITUDES] if amplitude is None else [amplitude]
-    best = max((_likelihood(prior, noise, observed, one) for one in tried), key=lambda found: found[0])
+    best: tuple[float, float, FloatArray, FloatArray] | None = None
+    for tried in [a * UNIT for a in _AMPLITUDES] if amplitude is None else [amplitude]:
+        total = tried * prior
+        total[np.diag_indices_from(total)] += noise + _JITTER * tried
+        lower, _ = cho_factor(total, lower=True, overwrite_a=True, check_finite=False)
+        lower = np.tril(lower)
+        weights = np.asarray(cho_solve((lower, True), observed, check_finite=False))
+        likelihood = -0.5 * float(observed @ weights) - float(np.log(np.diag(lower)).sum())
+        if best is None or likelihood > best[0]:
+            best = likelihood, tried, lower, weights
+    assert best is not None
     _, chosen, factor, weights = best
     return ThinPlateField(centre, reach, data, weights.reshape(-1, 4), factor, chosen)
 
 
-def _likelihood(
-    prior: FloatArray, noise: FloatArray, observed: FloatArray, amplitude: float
-) -> tuple[float, float, FloatArray, FloatArray]:
-    """Log-likelihood, the amplitude, the factor and the weights."""
-    total = amplitude * prior
-    total[np.diag_indices_from(total)] += noise + _JITTER * amplitude
-    factor, lower = cho_factor(total, lower=True, overwrite_a=True, check_finite=False)
-    factor = np.tril(factor)
-    weights = np.asarray(cho_solve((factor, lower), observed, check_finite=False))
-    log_likelihood = -0.5 * float(observed @ weights) - float(np.log(np.diag(factor)).sum())
-    return log_likelihood, amplitude, factor, weights
-
-
-def _cross(at: FloatArray, of: FloatArray, gradients: bool = False) -> FloatArray:
-    """Covariances of values at ``(m, 3)`` places, and of gradients if asked, with all data of ``(n, 3)``.
-
-    ``(m, 4 n)``, or ``(4 m, 4 n)``: of each place the value, then the three components of the gradient.
-    """
-    return _covariances(at, of, 4 if gradients else 1)
-
-
 @compiled
 def _covariances(at: FloatArray, of: FloatArray, rows: int) -> FloatArray:
+    """``(rows m, 4 n)`` covariances of values at ``(m, 3)`` places with all data of ``(n, 3)``.
+
+    With 4 ``rows`` a place, of the value and of the three components of the gradient there; with 1, of the
+    value alone.
+    """
     found = np.zeros((rows * len(at), 4 * len(of)))
     d = np.empty(3)
     for m in range(len(at)):

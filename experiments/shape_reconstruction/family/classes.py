@@ -81,27 +81,21 @@ _SAMPLE = 40
 
 def rarity(shape: FamilyShape) -> float:
     """Natural logarithm of how much rarer such a thing is, with such parts, than an ordinary one."""
-    apart = (np.array(codes_of(shape.name)) != shape.code).astype(np.float64)
+    code, theta = shape.code, shape.theta
+    apart = (np.array(codes_of(shape.name)) != code).astype(np.float64)
     apart[:, layout.HOLLOW] *= SOLID / PART
     price = PART * float(apart.sum(axis=1).min()) + _UNNAMED.get(shape.name, 0.0)
-    unlikely = _widens(shape) and shape.code[layout.HOLLOW] == 0 and not apart[:, layout.HOLLOW].any()
-    return price + SOLID * (int(unlikely) + int(_is_trough(shape)))
-
-
-def _is_trough(shape: FamilyShape) -> bool:
-    """Whether a vessel with straight sides is much longer than wide, as none that is drawn is."""
-    if shape.code[layout.PLAN] != CORED or shape.code[layout.HOLLOW] == 0:
-        return False
-    corner = np.exp(shape.theta[layout.RADII : layout.RADII + KNOTS].max())
-    sides = np.exp(shape.theta[[layout.CORE_X, layout.CORE_Y]]) + corner
-    return bool(sides.min() < NARROW * sides.max())
-
-
-def _widens(shape: FamilyShape) -> bool:
-    """Whether a turned body is widest at its top, as vessels are and solid things are not."""
-    radii = shape.theta[layout.RADII : layout.RADII + KNOTS]
-    wide = radii[-1] > radii.max() - 0.1 and radii[-1] > radii[0] + 0.15
-    return bool(shape.code[layout.KIND] == TURNED and wide)
+    radii = theta[layout.RADII : layout.RADII + KNOTS]
+    # Vessels are widest at the top, and solid things are not.
+    widens = code[layout.KIND] == TURNED and radii[-1] > radii.max() - 0.1 and radii[-1] > radii[0] + 0.15
+    if widens and code[layout.HOLLOW] == 0 and not apart[:, layout.HOLLOW].any():
+        price += SOLID
+    if code[layout.PLAN] == CORED and code[layout.HOLLOW] != 0:
+        # No vessel with straight sides that is drawn is much longer than wide.
+        sides = np.exp(theta[[layout.CORE_X, layout.CORE_Y]]) + np.exp(radii.max())
+        if sides.min() < NARROW * sides.max():
+            price += SOLID
+    return price
 
 
 @lru_cache(maxsize=64)
@@ -112,18 +106,14 @@ def codes_of(name: str) -> tuple[tuple[int, ...], ...]:
     return tuple(sorted(found))
 
 
-def add_loop(shape: FamilyShape, random: _Random) -> FamilyShape:
-    """The same turned body with a handle that is drawn."""
+def add_part(shape: FamilyShape, part: int, random: _Random) -> FamilyShape:
+    """Draw a handle (``layout.LIMB``) or a spout (``layout.SPOUT``) and add it to a turned body."""
     code, theta = shape.code.copy(), shape.theta.copy()
-    _loop(random, code, theta, float(np.exp(theta[layout.HEIGHT])))
-    return FamilyShape(shape.name, code, theta)
-
-
-def add_spout(shape: FamilyShape, random: _Random) -> FamilyShape:
-    """The same turned body with a spout that is drawn."""
-    code, theta = shape.code.copy(), shape.theta.copy()
-    widest = float(np.exp(theta[layout.RADII : layout.RADII + KNOTS].max()))
-    _spout(random, code, theta, 2.0 * widest)
+    if part == layout.LIMB:
+        _loop(random, code, theta, float(np.exp(theta[layout.HEIGHT])))
+    else:
+        widest = float(np.exp(theta[layout.RADII : layout.RADII + KNOTS].max()))
+        _spout(random, code, theta, 2.0 * widest)
     return FamilyShape(shape.name, code, theta)
 
 
@@ -170,16 +160,6 @@ def _loop(random: _Random, code: IntArray, theta: FloatArray, height: float) -> 
     theta[layout.LIMB_CORNER] = random.normal(0.3, 0.7)
     theta[layout.LIMB_THICK] = np.log(_between(random, 3.0, 8.0))
     theta[layout.LIMB_WIDE] = np.log(_between(random, 4.0, 13.0))
-
-
-def _bar(random: _Random, code: IntArray, theta: FloatArray) -> None:
-    code[layout.LIMB] = BAR
-    theta[layout.LIMB_AT] = random.uniform(0.6, 1.0)
-    theta[layout.LIMB_HALF] = np.log(10.0 * _MM)
-    theta[layout.LIMB_REACH] = np.log(_between(random, 90.0, 240.0))
-    theta[layout.LIMB_SLANT] = random.normal(0.1, 0.12)
-    theta[layout.LIMB_THICK] = np.log(_between(random, 4.0, 10.0))
-    theta[layout.LIMB_WIDE] = np.log(_between(random, 7.0, 16.0))
 
 
 def _spout(random: _Random, code: IntArray, theta: FloatArray, width: float) -> None:
@@ -315,7 +295,13 @@ def _pan(random: _Random, code: IntArray, theta: FloatArray) -> None:
     radii = radius * np.linspace(random.uniform(0.7, 1.0), 1.0, KNOTS)
     wall = _between(random, 1.5, 5.0)
     _turn(random, code, theta, height, radii, wall=wall, floor=wall * random.uniform(1.0, 2.0))
-    _bar(random, code, theta)
+    code[layout.LIMB] = BAR
+    theta[layout.LIMB_AT] = random.uniform(0.6, 1.0)
+    theta[layout.LIMB_HALF] = np.log(10.0 * _MM)
+    theta[layout.LIMB_REACH] = np.log(_between(random, 90.0, 240.0))
+    theta[layout.LIMB_SLANT] = random.normal(0.1, 0.12)
+    theta[layout.LIMB_THICK] = np.log(_between(random, 4.0, 10.0))
+    theta[layout.LIMB_WIDE] = np.log(_between(random, 7.0, 16.0))
 
 
 def _tray(random: _Random, code: IntArray, theta: FloatArray) -> None:

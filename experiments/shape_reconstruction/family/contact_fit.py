@@ -31,6 +31,7 @@ LEAST_OFF = 1.0e-3
 """M that a doubtful contact is off at least: normals at edges differ without being wrong."""
 
 _PROBE = 0.5e-3
+_MOVED_POINTS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +85,12 @@ def moved_points(
     contacts = [touch for touch, chosen in zip(evidence.contacts, which, strict=True) if chosen]
     if not contacts:
         return np.empty((0, 3)), np.empty((0, 3))
-    points = np.concatenate([_few(touch.points) + touch.stand_from_gel[:3, :3] @ gel for touch in contacts])
+    points = np.concatenate(
+        [
+            touch.points[:: max(len(touch.points) // _MOVED_POINTS, 1)] + touch.stand_from_gel[:3, :3] @ gel
+            for touch in contacts
+        ]
+    )
     ahead = np.concatenate(
         [distances(shape.code, shape.theta, points + _PROBE * axis)[:, None] for axis in np.eye(3)], axis=1
     )
@@ -95,10 +101,6 @@ def moved_points(
     length = np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-6)
     gap = distances(shape.code, shape.theta, points)
     return points, gap[:, None] * slope / length
-
-
-def _few(points: FloatArray, count: int = 8) -> FloatArray:
-    return points[:: max(len(points) // count, 1)]
 
 
 POINTS = 12
@@ -137,30 +139,25 @@ def turned_contacts(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
     Contacts of edges and corners are not judged, and 0.
     """
     found = np.zeros(len(evidence.contacts))
-    judged = [k for k, touch in enumerate(evidence.contacts) if _is_face(touch)]
+    judged = []
+    for k, touch in enumerate(evidence.contacts):
+        # A smooth piece of surface, wide both ways: an edge has no one normal.
+        middle = touch.points.mean(axis=0)
+        widths = np.linalg.svd(touch.points - middle, compute_uv=False) / np.sqrt(len(touch.points))
+        spread = np.arccos(np.clip(touch.normals @ touch.mean_normal, -1.0, 1.0))
+        if len(widths) > 1 and widths[1] > WIDE and spread.mean() < SMOOTH:
+            judged.append(k)
     if not judged:
         return found
-    tilts = np.array([_tilt(shape, evidence.contacts[k]) for k in judged])
-    least = max(TURNED, APART * float(np.median(tilts[:, 0])))
-    turned = (tilts[:, 0] > least) & (tilts[:, 1] > GAIN)
-    found[judged] = np.where(turned, tilts[:, 0], 0.0)
+    tilts, gains = np.zeros(len(judged)), np.zeros(len(judged))
+    for row, k in enumerate(judged):
+        patch = _Patch.of(evidence.contacts[k], shape.theta[layout.GEL : layout.GEL + 3])
+        _, shifted = _least(shape, patch, 3)
+        moved, turned = _least(shape, patch, 5)
+        tilts[row], gains[row] = np.linalg.norm(moved[3:]), shifted - turned
+    least = max(TURNED, APART * float(np.median(tilts)))
+    found[judged] = np.where((tilts > least) & (gains > GAIN), tilts, 0.0)
     return found
-
-
-def _is_face(touch: GuardedTouch) -> bool:
-    """Whether it met a smooth piece of surface, wide both ways: an edge has no one normal."""
-    middle = touch.points.mean(axis=0)
-    widths = np.linalg.svd(touch.points - middle, compute_uv=False) / np.sqrt(len(touch.points))
-    spread = np.arccos(np.clip(touch.normals @ touch.mean_normal, -1.0, 1.0))
-    return bool(len(widths) > 1 and widths[1] > WIDE and spread.mean() < SMOOTH)
-
-
-def _tilt(shape: FamilyShape, touch: GuardedTouch) -> tuple[float, float]:
-    """Rad that it is turned to fit best, and by how much its sum of squares is less for that."""
-    patch = _Patch.of(touch, shape.theta[layout.GEL : layout.GEL + 3])
-    _, shifted = _least(shape, patch, 3)
-    moved, turned = _least(shape, patch, 5)
-    return float(np.linalg.norm(moved[3:])), shifted - turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,14 +182,10 @@ class _Patch:
         normal = self.turn @ about @ self.normal
         share = np.sqrt(INDEPENDENT / len(points))
         gap = distances(shape.code, shape.theta, points) * share / POINT_SIGMA
-        bent = (_slope(shape, points.mean(axis=0) + OUT * normal) - normal) / NORMAL_SIGMA
+        steps = STEP * np.concatenate([np.eye(3), -np.eye(3)])
+        around = distances(shape.code, shape.theta, points.mean(axis=0) + OUT * normal + steps)
+        bent = ((around[:3] - around[3:]) / (2.0 * STEP) - normal) / NORMAL_SIGMA
         return np.concatenate([moved / _PRIOR, gap, bent])
-
-
-def _slope(shape: FamilyShape, point: FloatArray) -> FloatArray:
-    steps = STEP * np.concatenate([np.eye(3), -np.eye(3)])
-    around = distances(shape.code, shape.theta, point + steps)
-    return np.asarray((around[:3] - around[3:]) / (2.0 * STEP))
 
 
 def _least(shape: FamilyShape, patch: _Patch, free: int) -> tuple[FloatArray, float]:

@@ -194,12 +194,3 @@ def housing_row(
     off = nearest_on_face(code, q, moved, place)
     place -= moved[0] - seen.faces[i, 0]
     return float(off / seen.face_sigma[i])
-
-
-@compiled
-def held_housing_row(
-    code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, i: int, place: FloatArray
-) -> float:
-    """The same where the place that touches is held on the face."""
-    x, y, z = moved_by_gel(theta, seen.face_gel[i], place)
-    return float(distance(code, q, False, x, y, z) / seen.face_sigma[i])

@@ -13,7 +13,7 @@ from experiments.shape_reconstruction.estimators.free_space import silhouette_of
 from experiments.shape_reconstruction.estimators.knowledge import beyond_deviation, limited_sides
 from experiments.shape_reconstruction.estimators.knowledge import not_bounded as open_axes
 from experiments.shape_reconstruction.estimators.stated_space import TOO_LONG, longest_side, max_offset
-from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
+from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.contact_fit import (
@@ -124,19 +124,14 @@ def family_estimate(
         known_by=known_by(mesh.vertices, evidence),
         not_bounded=not_bounded(evidence, mesh, fit.typical > LOOSE or strain.beyond_belief),
         doubtful=doubtful,
-        flags=(
-            *_flags(mixture, fit, strain),
-            *_contact_flags(evidence, fit, rejected, settings.draws < LEVELS["fine"].draws),
-            *_turned_flags(evidence, turned),
-            *body.notes,
-        ),
+        flags=(*_flags(evidence, mixture, fit, strain, turned, settings), *body.notes),
         seconds=time.perf_counter() - began,
         details={
             **_details(mixture, fit),
             "strain": strain.cost,
             "strained": strain.beyond_belief,
             "sighted": evidence.sighted,
-            "beyond_m": _beyond(mesh, evidence),
+            "beyond_m": float(np.linalg.norm(beyond_contacts(mesh.vertices, evidence), axis=1).mean()),
         },
     )
     return found if evidence.contacts else _by_picture_alone(found, evidence)
@@ -164,11 +159,6 @@ def _at_stated_place(hypotheses: list[Hypothesis], evidence: ShapeEvidence) -> l
             f"{evidence.place_error * 1e3:g} mm; correct object.pose.position or these two"
         )
     return kept
-
-
-def _beyond(mesh: Mesh, evidence: ShapeEvidence) -> float:
-    """M, mean over the answer of how far it lies beyond its contacts."""
-    return float(np.linalg.norm(beyond_contacts(mesh.vertices, evidence), axis=1).mean())
 
 
 def _by_picture_alone(found: ShapeEstimate, evidence: ShapeEvidence) -> ShapeEstimate:
@@ -225,10 +215,17 @@ def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh, fit: ContactFit, sight
     return np.asarray(np.sqrt(known + UNDERSIDE**2 * under) * (1.0 if sighted else BLIND))
 
 
-def _flags(mixture: Mixture, fit: ContactFit, strain: Strain) -> tuple[str, ...]:
+def _flags(
+    evidence: ShapeEvidence,
+    mixture: Mixture,
+    fit: ContactFit,
+    strain: Strain,
+    turned: FloatArray,
+    settings: FamilySettings,
+) -> list[str]:
+    """State rival classes, a poor fit, and the contacts that do not fit, with the reason."""
     flags = []
-    classes = mixture.by_class()
-    rivals = [name for name, weight in classes.items() if weight >= RIVAL]
+    rivals = [name for name, weight in mixture.by_class().items() if weight >= RIVAL]
     if len(rivals) > 1:
         flags.append(f"class unknown: {' or '.join(rivals)}")
     if fit.typical > OUTSIDE:
@@ -237,35 +234,28 @@ def _flags(mixture: Mixture, fit: ContactFit, strain: Strain) -> tuple[str, ...]
         )
     if strain.beyond_belief:
         flags.append(f"outside the family: such a shape fits with {strain.most}")
-    return tuple(flags)
-
-
-def _contact_flags(
-    evidence: ShapeEvidence, fit: ContactFit, rejected: BoolArray, may_be_finer: bool
-) -> list[str]:
-    """Name the contacts that do not fit, with the reason, and say whether the surface passes through them."""
-    if not fit.doubtful.any():
-        return []
-    named = ", ".join(
-        f"{touch.index} ({1e3 * off:.1f} mm)"
-        for touch, off, bad in zip(evidence.contacts, fit.off, fit.doubtful, strict=True)
+    listed = ", ".join(
+        f"{touch.index} ({1e3 * gap:.1f} mm)"
+        for touch, gap, bad in zip(evidence.contacts, fit.off, fit.doubtful, strict=True)
         if bad
     )
-    rest = 1e3 * float(np.median(fit.off[~fit.doubtful])) if not fit.doubtful.all() else np.inf
-    finer = f"; {FINER}" if may_be_finer and fit.doubtful.sum() > 1 else ""
-    if not rejected.any():
-        off = f"contacts off the household shape: {named}; they are too many to have slipped and all count"
-        return [off + finer]
-    return [f"contacts rejected as outliers: {named}, where the others fit to {rest:.1f} mm{finer}"]
-
-
-def _turned_flags(evidence: ShapeEvidence, turned: FloatArray) -> list[str]:
-    named = [
+    finer = f"; {FINER}" if settings.draws < LEVELS["fine"].draws and fit.doubtful.sum() > 1 else ""
+    if _outliers(fit).any():
+        rest = 1e3 * float(np.median(fit.off[~fit.doubtful])) if not fit.doubtful.all() else np.inf
+        flags.append(f"contacts rejected as outliers: {listed}, where the others fit to {rest:.1f} mm{finer}")
+    elif fit.doubtful.any():
+        flags.append(
+            f"contacts off the household shape: {listed}; they are too many to have slipped and all "
+            f"count{finer}"
+        )
+    angles = [
         f"{touch.index} ({np.degrees(angle):.0f} deg)"
         for touch, angle in zip(evidence.contacts, turned, strict=True)
         if angle > 0.0
     ]
-    return [f"contacts whose pose is turned against the rest: {', '.join(named)}"] if named else []
+    if angles:
+        flags.append(f"contacts whose pose is turned against the rest: {', '.join(angles)}")
+    return flags
 
 
 def _details(mixture: Mixture, fit: ContactFit) -> dict[str, object]:
@@ -309,26 +299,21 @@ MOST_HIDDEN = 0.4
 def known_by(vertices: FloatArray, evidence: ShapeEvidence) -> IntArray:
     """``(n,)`` ``SUPPOSED``, ``SEEN`` or ``TOUCHED``."""
     known = np.full(len(vertices), SUPPOSED, np.int64)
-    if evidence.look is not None and evidence.look.mask.any():
-        known[_at_border(vertices, evidence.look)] = SEEN
+    look = evidence.look
+    if look is not None and look.mask.any():
+        in_camera = apply(inverse(look.stand_from_camera), vertices)
+        rows, columns = look.mask.shape
+        depth = np.maximum(in_camera[:, 2], 1e-3)
+        places = look.focal_length * in_camera[:, :2] / depth[:, None] + 0.5 * np.array([columns, rows])
+        border = look.mask ^ ndimage.binary_erosion(look.mask)
+        away = ndimage.distance_transform_edt(~(border & ~look.hidden))
+        column, row = np.floor(places).astype(np.int64).T
+        shown = (column >= 0) & (row >= 0) & (column < columns) & (row < rows) & (in_camera[:, 2] > 0.0)
+        known[np.flatnonzero(shown)[away[row[shown], column[shown]] <= BORDER]] = SEEN
     points = [touch.points for touch in evidence.contacts]
     if points:
         known[cKDTree(np.concatenate(points)).query(vertices)[0] <= UNDER_GEL] = TOUCHED
     return known
-
-
-def _at_border(vertices: FloatArray, look: SeenMask) -> BoolArray:
-    in_camera = apply(inverse(look.stand_from_camera), vertices)
-    rows, columns = look.mask.shape
-    depth = np.maximum(in_camera[:, 2], 1e-3)
-    places = look.focal_length * in_camera[:, :2] / depth[:, None] + 0.5 * np.array([columns, rows])
-    border = look.mask ^ ndimage.binary_erosion(look.mask)
-    away = ndimage.distance_transform_edt(~(border & ~look.hidden))
-    column, row = np.floor(places).astype(np.int64).T
-    inside = (column >= 0) & (row >= 0) & (column < columns) & (row < rows) & (in_camera[:, 2] > 0.0)
-    near = np.zeros(len(vertices), bool)
-    near[inside] = away[row[inside], column[inside]] <= BORDER
-    return near
 
 
 def not_bounded(evidence: ShapeEvidence, mesh: Mesh, outside: bool) -> tuple[str, ...]:
@@ -343,8 +328,14 @@ def not_bounded(evidence: ShapeEvidence, mesh: Mesh, outside: bool) -> tuple[str
         mesh: the answer.
         outside: whether its contacts do not fit any class.
     """
-    if evidence.look is not None and _limits(evidence.look):
-        return open_without_class(evidence, mesh) if outside else ()
+    look = evidence.look
+    if look is not None and look.mask.any():
+        around = ndimage.binary_dilation(look.mask, iterations=2) & ~look.mask
+        edge = look.mask.copy()
+        edge[1:-1, 1:-1] = False
+        hidden = int((around & look.hidden).sum()) + int(edge.sum())
+        if hidden <= MOST_HIDDEN * max(int(around.sum()), 1):  # enough of its border is seen
+            return open_without_class(evidence, mesh) if outside else ()
     normals = np.array([touch.mean_normal for touch in evidence.contacts]).reshape(-1, 3)
     supposed = beyond_contacts(mesh.vertices, evidence).max(axis=0)
     free = []
@@ -380,14 +371,3 @@ def beyond_contacts(vertices: FloatArray, evidence: ShapeEvidence) -> FloatArray
     low, high = met.min(axis=0), met.max(axis=0)
     low[2] = min(low[2], 0.0)
     return np.asarray(np.maximum(np.maximum(low - vertices, vertices - high), 0.0))
-
-
-def _limits(look: SeenMask) -> bool:
-    """Whether enough of a silhouette's border is seen."""
-    if not look.mask.any():
-        return False
-    around = ndimage.binary_dilation(look.mask, iterations=2) & ~look.mask
-    edge = look.mask.copy()
-    edge[1:-1, 1:-1] = False
-    hidden = int((around & look.hidden).sum()) + int(edge.sum())
-    return bool(hidden <= MOST_HIDDEN * max(int(around.sum()), 1))

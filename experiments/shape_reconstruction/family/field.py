@@ -46,13 +46,17 @@ def median_surface(mixture: Mixture, pitch: float, contacts: FloatArray | None =
         contacts: ``(n, 3)`` points of the surface that were touched, m; they decide which piece is the body.
     """
     pairs = zip(mixture.hypotheses, mixture.weights, strict=True)
-    shapes = [(one.shape, float(weight)) for one, weight in pairs if weight >= _WEIGHT]
-    low, high = _box([shape for shape, _ in shapes])
-    thinnest = min(_thickness(shape) for shape, _ in shapes)
-    cell = max(min(pitch, thinnest / _RESOLVED), float((high - low).max()) / _MOST)
-    weights = np.array([weight for _, weight in shapes])
+    kept = [(one.shape, float(weight)) for one, weight in pairs if weight >= _WEIGHT]
+    shapes, weights = [shape for shape, _ in kept], np.array([weight for _, weight in kept])
+    corners = np.concatenate([corners_of(shape) for shape in shapes])
+    low, high = corners.min(axis=0) - 4e-3, corners.max(axis=0) + 4e-3
+    thinnest = min(_thickness(shape) for shape in shapes)
+    coarsest = max(min(pitch, thinnest / _RESOLVED), float((high - low).max()) / _MOST)
     for finer in _FINER:
-        fields = _fields([shape for shape, _ in shapes], low, high, finer * cell)
+        cell = finer * coarsest
+        counts = np.ceil((high - low) / cell).astype(np.int64) + 1
+        thick = [_thickened(shape, _RESOLVED * cell) for shape in shapes]
+        fields = np.stack([grid_distances(shape, low, cell, counts) for shape in thick])
         median = _weighted_median(fields, weights / weights.sum())
         # Thin bodies that lie apart have no place in common that half of the belief is inside of.
         inside = median if median.min() < 0.0 else fields[0]
@@ -60,21 +64,9 @@ def median_surface(mixture: Mixture, pitch: float, contacts: FloatArray | None =
             break
     else:
         # A plate thinner than any cell: drawn as thick as it shows.
-        inside = inside - (inside.min() + _SLIVER * finer * cell)
-    above = _above_support(inside, low[2], finer * cell)
-    return extract_body(above, low, finer * cell, contacts)
-
-
-def _above_support(inside: FloatArray, low: float, cell: float) -> FloatArray:
-    """Distances on a grid whose least height is ``low``, of what is not far below the support."""
-    heights = low + cell * np.arange(inside.shape[2])
-    return np.asarray(np.maximum(inside, -BELOW - heights))
-
-
-def _fields(shapes: list[FamilyShape], low: FloatArray, high: FloatArray, cell: float) -> FloatArray:
-    """``(shapes, nx, ny, nz)`` m: their signed distances on one grid."""
-    counts = np.ceil((high - low) / cell).astype(np.int64) + 1
-    return np.stack([grid_distances(_thickened(one, _RESOLVED * cell), low, cell, counts) for one in shapes])
+        inside = inside - (inside.min() + _SLIVER * finer * coarsest)
+    heights = low[2] + cell * np.arange(inside.shape[2])
+    return extract_body(np.maximum(inside, -BELOW - heights), low, cell, contacts)
 
 
 def _thickness(shape: FamilyShape) -> float:
@@ -104,11 +96,6 @@ def _thickened(shape: FamilyShape, least: float) -> FamilyShape:
 def grid_distances(shape: FamilyShape, origin: FloatArray, cell: float, counts: IntArray) -> FloatArray:
     """``counts`` m: signed distances, right near the surface and of the right sign elsewhere."""
     return np.asarray(_fill(shape.code, shape.theta, origin, cell, counts))
-
-
-def _box(shapes: list[FamilyShape]) -> tuple[FloatArray, FloatArray]:
-    corners = np.concatenate([corners_of(shape) for shape in shapes])
-    return corners.min(axis=0) - 4e-3, corners.max(axis=0) + 4e-3
 
 
 def corners_of(shape: FamilyShape) -> FloatArray:

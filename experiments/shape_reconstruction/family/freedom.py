@@ -4,8 +4,10 @@ A fit may lift a shape off its support, lean it, or move the gel and the camera.
 takes more of that than any calibration leaves.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -59,7 +61,7 @@ _SPOUT = {
 _SMOOTH = 0.10
 """Second difference of a section's deviation from its draw."""
 
-_SIZES = {
+SIZES = {
     TURNED: (
         layout.HEIGHT, *range(layout.RADII, layout.RADII + layout.KNOTS), layout.WALL, layout.FLOOR,
         layout.CORE_X, layout.CORE_Y, layout.LIMB_HALF, layout.LIMB_REACH, layout.LIMB_THICK,
@@ -70,6 +72,22 @@ _SIZES = {
     ),
     BENT: (layout.ARC, *range(layout.GIRTHS, layout.GIRTHS + layout.GIRTH_KNOTS)),
 }  # fmt: skip
+
+
+_F = TypeVar("_F", bound=Callable[..., FloatArray])
+
+
+def _kept_by_code(make: _F) -> _F:
+    """Cache what a function returns for each code of a shape."""
+
+    @lru_cache(maxsize=256)
+    def kept(code: tuple[int, ...], *rest: bool) -> FloatArray:
+        return make(np.array(code), *rest)
+
+    def found(code: IntArray, *rest: bool) -> FloatArray:
+        return kept(tuple(int(part) for part in code), *rest)
+
+    return cast(_F, found)
 
 
 def deviations(code: IntArray) -> dict[int, float]:
@@ -103,22 +121,17 @@ def deviations(code: IntArray) -> dict[int, float]:
     return free
 
 
-def sizes_of(code: IntArray) -> tuple[int, ...]:
-    """Slots of all the kind's lengths: they scale together."""
-    return _SIZES[int(code[layout.KIND])]
-
-
 def has_yaw(code: IntArray) -> bool:
     """Whether a turn about the vertical changes the shape."""
     plain = code[layout.PLAN] == ROUND and code[layout.LIMB] == NO_LIMB and code[layout.SPOUT] == 0
     return bool(code[layout.KIND] != TURNED or not plain)
 
 
-@lru_cache(maxsize=256)
-def _basis_of(code: tuple[int, ...], sighted: bool, touched: bool) -> FloatArray:
-    coded = np.array(code)
-    slots = [layout.X, layout.Y, layout.LIFT, layout.TILT_X, layout.TILT_Y, *deviations(coded)]
-    if has_yaw(coded):
+@_kept_by_code
+def basis_of(code: IntArray, sighted: bool, touched: bool) -> FloatArray:
+    """``(n, SIZE)`` every number that is free, by itself."""
+    slots = [layout.X, layout.Y, layout.LIFT, layout.TILT_X, layout.TILT_Y, *deviations(code)]
+    if has_yaw(code):
         slots.append(layout.YAW)
     if sighted:
         slots += [layout.CAMERA_RIGHT, layout.CAMERA_DOWN, layout.CAMERA_SCALE, layout.OUTLINE]
@@ -127,29 +140,15 @@ def _basis_of(code: tuple[int, ...], sighted: bool, touched: bool) -> FloatArray
     return np.asarray(np.eye(layout.SIZE)[np.sort(slots)])
 
 
-def basis_of(code: IntArray, sighted: bool, touched: bool) -> FloatArray:
-    """``(n, SIZE)`` every number that is free, by itself."""
-    return _basis_of(_key(code), sighted, touched)
-
-
+@_kept_by_code
 def stand_basis(code: IntArray, two_senses: bool) -> FloatArray:
     """``(n, SIZE)`` directions of place, turn, size and proportions, along which a draw is laid down.
 
     With ``two_senses``, sight and touch, the picture's shift too: it is what they differ by most.
     """
-    return _stand_basis(_key(code), two_senses)
-
-
-def _key(code: IntArray) -> tuple[int, ...]:
-    return tuple(int(part) for part in code)
-
-
-@lru_cache(maxsize=256)
-def _stand_basis(key: tuple[int, ...], two_senses: bool) -> FloatArray:
-    code = np.array(key)
     kind = int(code[layout.KIND])
     rows = [_along(layout.CAMERA_RIGHT), _along(layout.CAMERA_DOWN)] if two_senses else []
-    rows += [_along(layout.X), _along(layout.Y), _along(*_SIZES[kind])]
+    rows += [_along(layout.X), _along(layout.Y), _along(*SIZES[kind])]
     rows.append(_along({TURNED: layout.HEIGHT, TOOL: layout.LENGTH, BENT: layout.ARC}[kind]))
     if has_yaw(code):
         rows.append(_along(layout.YAW))
@@ -177,14 +176,9 @@ def bench_rows(place: float, support: float, pixel: float, shift: float, scale: 
     return np.array([_along(slot) / sigma for slot, sigma in sigmas.items()])
 
 
+@_kept_by_code
 def shape_rows(code: IntArray) -> FloatArray:
     """``(n, SIZE)`` of a prior: each free number by itself, and the section's second differences."""
-    return _shape_rows(_key(code))
-
-
-@lru_cache(maxsize=256)
-def _shape_rows(key: tuple[int, ...]) -> FloatArray:
-    code = np.array(key)
     rows = [_along(slot) / sigma for slot, sigma in deviations(code).items()]
     first, count = {
         TURNED: (layout.RADII, layout.KNOTS), TOOL: (0, 0), BENT: (layout.GIRTHS, layout.GIRTH_KNOTS)
@@ -194,15 +188,12 @@ def _shape_rows(key: tuple[int, ...]) -> FloatArray:
     return np.array(rows)
 
 
+@_kept_by_code
 def stand_rows(code: IntArray) -> FloatArray:
-    """``(n, SIZE)`` of the prior while a draw is laid on the readings: its size and proportions."""
-    return _stand_rows(_key(code))
+    """``(n, SIZE)`` of the prior while a draw is laid on the readings: its size and proportions.
 
-
-@lru_cache(maxsize=256)
-def _stand_rows(key: tuple[int, ...]) -> FloatArray:
-    # One length stands for the size, as all scale together; a place has its own rows, any turn is as likely.
-    code = np.array(key)
+    One length stands for the size, as all scale together; a place has its own rows, any turn is as likely.
+    """
     kind = int(code[layout.KIND])
     anchor = {TURNED: layout.RADII, TOOL: layout.SHAFT_A, BENT: layout.GIRTHS + 2}[kind]
     tall = {TURNED: layout.HEIGHT, TOOL: layout.LENGTH, BENT: layout.ARC}[kind]

@@ -151,7 +151,8 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
     clear = [touch.clear[: CLEAR // 2 if coarse else CLEAR] for touch in contacts]
     sigma = np.array([np.hypot(touch.sigma, MODEL) for touch in contacts])
     stopped = () if coarse else evidence.ended_by_housing
-    supposed = _some(evidence.supposed, SUPPOSED // 3 if coarse else SUPPOSED)
+    most = SUPPOSED // 3 if coarse else SUPPOSED
+    supposed = evidence.supposed[:: max(-(-len(evidence.supposed) // most), 1)]
     rays = no_rays() if evidence.look is None else sight_rays(evidence.look, coarse)
     return FamilyEvidence(
         points=_stacked(points, 3),
@@ -160,7 +161,12 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
         worth=np.array([min(WORTH, len(rows)) / len(rows) for rows in points]),
         middles=_stacked([touch.points.mean(axis=0)[None] for touch in contacts], 3),
         normals=_stacked([touch.mean_normal[None] for touch in contacts], 3),
-        normal_sigma=np.array([_normal_sigma(touch) for touch in contacts]),
+        normal_sigma=np.array(
+            [
+                np.hypot(np.hypot(one.normal_sigma, TURNED_MODEL), BENDING * one.normal_spread)
+                for one in contacts
+            ]
+        ),
         gel=np.array([touch.stand_from_gel[:3, :3] for touch in contacts]).reshape(-1, 3, 3),
         clear=_stacked(clear, 3),
         clear_touch=_numbered(clear),
@@ -180,12 +186,6 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
     )
 
 
-def _normal_sigma(touch: GuardedTouch) -> float:
-    """Rad: what its mean normal is off from a shape's that is right, one standard deviation."""
-    read = np.hypot(touch.normal_sigma, TURNED_MODEL)
-    return float(np.hypot(read, BENDING * touch.normal_spread))
-
-
 def _face(evidence: ShapeEvidence, touch: GuardedTouch) -> FloatArray:
     """``(3, 3)`` m: the middle of the housing's face at the end of a way, and half of either side."""
     turn, half = touch.stand_from_gel[:3, :3], 0.5 * np.array(evidence.housing)
@@ -200,11 +200,6 @@ def _along_support(shift: FloatArray, sight: FloatArray) -> FloatArray:
     return np.asarray(shift - sight * (shift[2] / sight[2]))
 
 
-def _some(places: FloatArray, count: int) -> FloatArray:
-    """So many of them at most, spread over their order."""
-    return places[:: max(-(-len(places) // count), 1)]
-
-
 def _stacked(parts: list[FloatArray], columns: int) -> FloatArray:
     return read_only(np.concatenate([np.empty((0, columns)), *parts]))
 
@@ -216,22 +211,20 @@ def _numbered(parts: list[FloatArray]) -> IntArray:
 
 def _free_places(evidence: ShapeEvidence, coarse: bool) -> FloatArray:
     """``(k, 3)`` m inside the housing and, of a miss, before the gel, above the support."""
-    places = [_of_touch(evidence, touch, coarse) for touch in evidence.distinct]
-    free = _stacked(places, 3)
-    return np.ascontiguousarray(free[free[:, 2] > 0.0])
-
-
-def _of_touch(evidence: ShapeEvidence, touch: GuardedTouch, coarse: bool) -> FloatArray:
     across = 3 if coarse else _ACROSS
     depths = [0.0, 25.0e-3] if coarse else [d for d in _LAYERS if d <= evidence.housing_depth]
-    layers = [-evidence.gel_thickness - depth for depth in depths]
-    boxes = [_plate(evidence.housing, across, z) for z in layers]
-    if not touch.met:
-        # The gel itself went all this way and touched nothing.
-        half = tuple(0.6 * side for side in evidence.housing)
-        steps = np.arange(0.0, max(touch.way, _WAY_STEP), _WAY_STEP * (2 if coarse else 1))
-        boxes += [_plate((half[0], half[1]), 3, -step) for step in steps]
-    return apply(touch.stand_from_gel, np.concatenate(boxes))
+    housing = [_plate(evidence.housing, across, -evidence.gel_thickness - depth) for depth in depths]
+    half = (0.6 * evidence.housing[0], 0.6 * evidence.housing[1])
+    places = []
+    for touch in evidence.distinct:
+        boxes = list(housing)
+        if not touch.met:
+            # The gel itself went all this way and touched nothing.
+            steps = np.arange(0.0, max(touch.way, _WAY_STEP), _WAY_STEP * (2 if coarse else 1))
+            boxes += [_plate(half, 3, -step) for step in steps]
+        places.append(apply(touch.stand_from_gel, np.concatenate(boxes)))
+    free = _stacked(places, 3)
+    return np.ascontiguousarray(free[free[:, 2] > 0.0])
 
 
 def _plate(sides: tuple[float, float], across: int, z: float) -> FloatArray:
@@ -282,7 +275,8 @@ def sight_rays(look: SeenMask, coarse: bool) -> SightRays:
     which = 0 if coarse else 1
     clear = ~ndimage.binary_dilation(look.hidden, iterations=_CLEAR) if look.hidden.any() else ~look.hidden
     outline = _spread(_outline(look.mask, clear), _GRAZING[which])
-    inside = _spread(_inside(look.mask, clear), _MEETING[which])
+    rows, columns = np.nonzero((ndimage.distance_transform_edt(look.mask) > 1.5) & clear)
+    inside = _spread(np.column_stack([columns + 0.5, rows + 0.5]), _MEETING[which])
     outside, away = _outside(look.mask, clear, which)
     places = np.concatenate([outline, inside, outside])
     kinds = np.repeat([GRAZE, MEET, PASS], [len(outline), len(inside), len(outside)]).astype(np.int64)
@@ -350,12 +344,6 @@ def _outline(mask: BoolArray, clear: BoolArray) -> FloatArray:
     height, width = mask.shape
     edge = (places[:, 0] < 3) | (places[:, 1] < 3) | (places[:, 0] > width - 3) | (places[:, 1] > height - 3)
     return np.asarray(places[~edge])
-
-
-def _inside(mask: BoolArray, clear: BoolArray) -> FloatArray:
-    depth = ndimage.distance_transform_edt(mask)
-    rows, columns = np.nonzero((depth > 1.5) & clear)
-    return np.column_stack([columns + 0.5, rows + 0.5])
 
 
 def _outside(mask: BoolArray, clear: BoolArray, which: int) -> tuple[FloatArray, FloatArray]:

@@ -53,24 +53,26 @@ class Mixture:
 
 
 def mixture_of(found: list[Hypothesis], sighted: bool, touched: bool, seed: int) -> Mixture:
-    """Weights by cost and by how much of its prior each hypothesis had to give up (Laplace)."""
-    found = _modes(found, sighted, touched)
-    scores = np.array([_log_weight(one, sighted, touched) for one in found])
+    """Weights by cost and by how much of its prior each hypothesis had to give up (Laplace).
+
+    Of each mode only the hypothesis of least cost counts: two within one uncertainty would count it twice.
+    """
+    modes: list[Hypothesis] = []
+    for one in sorted(found, key=lambda one: one.cost):
+        if not any(_of_one_mode(one, other, sighted, touched) for other in modes):
+            modes.append(one)
+    scores = np.empty(len(modes))
+    for k, one in enumerate(modes):
+        prior = _prior_precision(one, sighted, touched)
+        _, narrow = np.linalg.slogdet(one.curvature / TEMPERATURE + prior * (1.0 - 1.0 / TEMPERATURE))
+        _, wide = np.linalg.slogdet(prior)
+        scores[k] = -one.cost / TEMPERATURE - 0.5 * (narrow - wide)
     weights = np.exp(scores - scores.max())
     order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] >= LEAST]
     kept = weights[order] / weights[order].sum()
     random = np.random.default_rng(seed)
-    about = tuple(_drawn(found[i], sighted, touched, random) for i in order)
-    return Mixture(tuple(found[i] for i in order), kept, about)
-
-
-def _modes(found: list[Hypothesis], sighted: bool, touched: bool) -> list[Hypothesis]:
-    """One hypothesis of each mode, that of least cost: two within one uncertainty would count it twice."""
-    kept: list[Hypothesis] = []
-    for one in sorted(found, key=lambda one: one.cost):
-        if not any(_of_one_mode(one, other, sighted, touched) for other in kept):
-            kept.append(one)
-    return kept
+    about = tuple(_drawn(modes[i], sighted, touched, random) for i in order)
+    return Mixture(tuple(modes[i] for i in order), kept, about)
 
 
 def _of_one_mode(one: Hypothesis, other: Hypothesis, sighted: bool, touched: bool) -> bool:
@@ -82,13 +84,6 @@ def _of_one_mode(one: Hypothesis, other: Hypothesis, sighted: bool, touched: boo
     off[turn] = np.arctan2(np.sin(off[turn]), np.cos(off[turn]))
     precision = other.curvature / TEMPERATURE + _prior_precision(other, sighted, touched)
     return float(off @ precision @ off) < len(off)
-
-
-def _log_weight(one: Hypothesis, sighted: bool, touched: bool) -> float:
-    prior = _prior_precision(one, sighted, touched)
-    _, narrow = np.linalg.slogdet(one.curvature / TEMPERATURE + prior * (1.0 - 1.0 / TEMPERATURE))
-    _, wide = np.linalg.slogdet(prior)
-    return float(-one.cost / TEMPERATURE - 0.5 * (narrow - wide))
 
 
 def _prior_precision(one: Hypothesis, sighted: bool, touched: bool) -> FloatArray:

@@ -10,8 +10,8 @@ import numpy as np
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import FamilyShape, add_loop, add_spout, size_of
-from experiments.shape_reconstruction.family.freedom import deviations, has_yaw, sizes_of
+from experiments.shape_reconstruction.family.classes import FamilyShape, add_part, size_of
+from experiments.shape_reconstruction.family.freedom import SIZES, deviations, has_yaw
 from experiments.shape_reconstruction.family.layout import (
     CORED,
     DISC,
@@ -99,9 +99,12 @@ def lay(shape: FamilyShape, guides: Guides, random: _Random, place_error: float,
         ``(yaws, SIZE)``.
     """
     theta = shape.theta.copy()
-    long = _is_long(shape)
-    turn = long_way(guides.on_level(0.5 * size_of(shape.code, theta)[1])) if guides.sighted and long else None
-    theta[list(sizes_of(shape.code))] += _log_scale(shape, guides, random, turn)
+    long = bool(shape.code[layout.KIND] != TURNED)
+    turn = None
+    if guides.sighted and long:
+        found = _long_direction(guides.on_level(0.5 * size_of(shape.code, theta)[1]))
+        turn = 0.0 if found is None else found
+    theta[list(SIZES[int(shape.code[layout.KIND])])] += _log_scale(shape, guides, random, turn)
     theta[layout.X : layout.Y + 1] = _middle(shape, theta, guides, random, place_error, long)
     count = yaws if has_yaw(shape.code) else 1
     laid = np.repeat(theta[None], count, axis=0)
@@ -125,36 +128,27 @@ def _span(theta: FloatArray, places: FloatArray, random: _Random) -> None:
     theta[[layout.CORE_X, layout.CORE_Y]] = np.log(np.maximum(half - corner, 0.1 * half))
 
 
-def _is_long(shape: FamilyShape) -> bool:
-    return bool(shape.code[layout.KIND] != TURNED)
-
-
 def _log_scale(shape: FamilyShape, guides: Guides, random: _Random, turn: float | None) -> float:
     """By which all lengths of a draw are scaled, so that it is as large as what was seen or touched."""
-    if random.random() < OWN:
+    if random.random() < OWN or not (guides.sighted or guides.touched):
         return 0.0
     half, height = size_of(shape.code, shape.theta)
-    if guides.sighted:
-        return float(np.clip(np.log(_seen_scale(guides, half, height, turn)), -_MOST_SCALE, _MOST_SCALE))
-    if not guides.touched:
-        return 0.0
-    wide, high = float(np.linalg.norm(guides.extents[:2])), float(guides.extents[2])
-    least = max(wide / (2.0 * half), high / height)
-    # Contacts reach nearly all of it, or are few and in one part of it.
-    fitting = np.log(least) + random.uniform(0.0, 0.35)
-    return float(np.clip(fitting, -_MOST_SCALE, _MOST_SCALE))
-
-
-def _seen_scale(guides: Guides, half: float, height: float, turn: float | None) -> float:
-    down = -guides.middle_ray[2]
-    away = (guides.eye[2] - 0.4 * height) / max(down, 0.05)
-    if turn is not None:
+    if not guides.sighted:
+        wide, high = float(np.linalg.norm(guides.extents[:2])), float(guides.extents[2])
+        least = max(wide / (2.0 * half), high / height)
+        # Contacts reach nearly all of it, or are few and in one part of it.
+        scaled = np.log(least) + random.uniform(0.0, 0.35)
+    elif turn is not None:
         level = guides.on_level(0.5 * height)
         along = level @ np.array([np.cos(turn), np.sin(turn)])
-        return float(max(np.ptp(along), 1e-3) / (2.0 * half)) if len(along) else 1.0
-    flat = float(np.sqrt(max(1.0 - down * down, 0.0)))
-    tall = height * flat + 2.0 * half * down
-    return float(away * np.sqrt(guides.seen[0] * guides.seen[1] / (2.0 * half * tall)))
+        scaled = np.log(max(np.ptp(along), 1e-3) / (2.0 * half)) if len(along) else 0.0
+    else:
+        down = -guides.middle_ray[2]
+        away = (guides.eye[2] - 0.4 * height) / max(down, 0.05)
+        flat = float(np.sqrt(max(1.0 - down * down, 0.0)))
+        tall = height * flat + 2.0 * half * down
+        scaled = np.log(away * np.sqrt(guides.seen[0] * guides.seen[1] / (2.0 * half * tall)))
+    return float(np.clip(scaled, -_MOST_SCALE, _MOST_SCALE))
 
 
 def _middle(
@@ -218,8 +212,8 @@ def _by_touch(evidence: ShapeEvidence) -> tuple[FloatArray, FloatArray, FloatArr
     axis = _axis(places[sides], normals[sides])
     if axis is not None:
         middles.append(axis)
-    flat = np.arctan2(normals[sides, 1], normals[sides, 0])
-    return places, np.array(middles), extents, np.concatenate([flat, _long_way(places[:, :2])])
+    turns, long = np.arctan2(normals[sides, 1], normals[sides, 0]), _long_direction(places[:, :2])
+    return places, np.array(middles), extents, turns if long is None else np.append(turns, long)
 
 
 def _axis(places: FloatArray, normals: FloatArray) -> FloatArray | None:
@@ -241,18 +235,12 @@ def _axis(places: FloatArray, normals: FloatArray) -> FloatArray | None:
     return np.asarray(middle)
 
 
-def _long_way(places: FloatArray) -> FloatArray:
-    """``(1,)`` rad: the way that plane places spread most; none for fewer than two."""
+def _long_direction(places: FloatArray) -> float | None:
+    """Direction along which plane places spread most, rad; None for fewer than two places."""
     if len(places) < 2:
-        return np.empty(0)
+        return None
     _, vectors = np.linalg.eigh(np.cov(places.T))
-    return np.array([np.arctan2(vectors[1, 1], vectors[0, 1])])
-
-
-def long_way(places: FloatArray) -> float:
-    """Rad: the way that plane places spread most; zero for fewer than two."""
-    found = _long_way(places)
-    return float(found[0]) if len(found) else 0.0
+    return float(np.arctan2(vectors[1, 1], vectors[0, 1]))
 
 
 def _by_sight(evidence: ShapeEvidence) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -318,11 +306,13 @@ def _of_vessel(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
         yield _turned(shape, -0.5 * np.pi)
     if code[layout.LIMB] != LOOP:
         for _ in range(LOOPS):
-            yield from _all_about(add_loop(shape, random), random)
+            looped, first = add_part(shape, layout.LIMB, random), random.uniform(0.0, 2.0 * np.pi)
+            for turn in range(TURNS):
+                yield _turned(looped, first + 2.0 * np.pi * turn / TURNS)
     if code[layout.SPOUT] != 0:
         yield _coded(shape, layout.SPOUT, 0)
     elif code[layout.LIMB] == LOOP:
-        yield add_spout(shape, random)
+        yield add_part(shape, layout.SPOUT, random)
     if code[layout.PLAN] == ROUND:
         yield _oval(shape, SUPER, 0.9)
         if code[layout.HOLLOW] == 0:
@@ -347,13 +337,6 @@ def _of_tool(shape: FamilyShape) -> Iterator[FamilyShape]:
                 theta[head] = theta[shaft] + np.log(ratio)
                 theta[hole] = theta[head] + np.log(_HOLE)
                 yield FamilyShape(changed.name, changed.code, theta)
-
-
-def _all_about(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
-    """The same at turns that are evenly spread."""
-    first = random.uniform(0.0, 2.0 * np.pi)
-    for turn in range(TURNS):
-        yield _turned(shape, first + 2.0 * np.pi * turn / TURNS)
 
 
 def _turned(shape: FamilyShape, by: float) -> FamilyShape:

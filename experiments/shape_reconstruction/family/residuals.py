@@ -13,7 +13,6 @@ from experiments.shape_reconstruction.family.contact_rows import (
     clear_row,
     contact_row_count,
     contacts_off,
-    held_housing_row,
     housing_row,
     moved_by_gel,
     normal_rows,
@@ -71,12 +70,6 @@ class Rows(NamedTuple):
     along: FloatArray
     held: FloatArray
     met: FloatArray
-
-
-@compiled
-def row_count(seen: FamilyEvidence) -> int:
-    """Rows of all readings: of contacts, housings, free places, rays, and of what is supposed."""
-    return int(first_supposed(seen) + len(seen.supposed))
 
 
 @compiled
@@ -196,7 +189,7 @@ def _weigh(row: int, worth: float, out: Rows) -> float:
 @compiled
 def rows_for(seen: FamilyEvidence) -> Rows:
     """Room for the rows of some readings."""
-    count = row_count(seen)
+    count = first_supposed(seen) + len(seen.supposed)
     rays = len(seen.rays.kinds)
     met = np.zeros((len(seen.faces), 3))
     return Rows(np.zeros(count), np.zeros(count), np.zeros(rays), np.zeros((rays, 3)), met)
@@ -276,7 +269,8 @@ def _carried(
         direction: ``(SIZE,)``.
         out: ``(active,)``.
     """
-    faces = contact_row_count(seen)
+    points, faces = len(seen.points), contact_row_count(seen)
+    clear = points + 3 * len(seen.middles)
     free, ray, supposed = faces + len(seen.faces), first_ray(seen), first_supposed(seen)
     right, down, nowhere = direction[CAMERA_RIGHT], direction[CAMERA_DOWN], np.zeros(3)
     seen_off = right * seen.rays.right + down * seen.rays.down
@@ -285,7 +279,12 @@ def _carried(
     for row in range(len(active)):
         i, x, y, z = active[row], 0.0, 0.0, 0.0
         if i < faces:
-            x, y, z = moved_by_gel(direction, seen.gel[_contact_of(seen, i)], nowhere)
+            j = (i - points) // 3
+            if i < points:
+                j = seen.touch[i]
+            elif i >= clear:
+                j = seen.clear_touch[i - clear]
+            x, y, z = moved_by_gel(direction, seen.gel[j], nowhere)
         elif i < free:
             x, y, z = moved_by_gel(direction, seen.face_gel[i - faces], nowhere)
         elif i >= supposed:
@@ -300,16 +299,6 @@ def _carried(
         )
         if ray <= i < supposed and seen.rays.kinds[i - ray] == GRAZE:
             out[row] -= per_outline
-
-
-@compiled
-def _contact_of(seen: FamilyEvidence, row: int) -> int:
-    """Which contact one of the contacts' rows is of."""
-    n = len(seen.points)
-    if row < n:
-        return int(seen.touch[row])
-    clear = n + 3 * len(seen.middles)
-    return int((row - n) // 3 if row < clear else seen.clear_touch[row - clear])
 
 
 @compiled
@@ -374,7 +363,8 @@ def frozen(
                 off = contacts_off(seen, out)  # all points are active: their rows are the first
             out[row] = clear_row(code, theta, seen, q, off, i - clear)
         elif i < free:
-            out[row] = held_housing_row(code, theta, seen, q, i - first, held.met[i - first])
+            x, y, z = moved_by_gel(theta, seen.face_gel[i - first], held.met[i - first])
+            out[row] = distance(code, q, False, x, y, z) / seen.face_sigma[i - first]
         elif i < ray:
             out[row] = free_row(code, seen, q, i - free)
         elif i >= first_supposed(seen):

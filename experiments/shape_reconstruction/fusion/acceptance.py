@@ -4,7 +4,6 @@ Each candidate predicts the contacts that were left out of its fit, and the outl
 is assumed until enough contacts at different places agree with it.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,7 +84,17 @@ def choose(fit: Candidate | None, smooth: Candidate | None, prior: ShapeEstimate
     reason = rejection_reason(fit, smooth)
     if reason is not None and smooth is not None:
         return _as_smooth(smooth, fit.estimate.flags, reason)
-    return _as_family(fit, reason)
+    found, count = fit.estimate, len(fit.left_out)
+    if count >= MIN_CONTACTS and reason is None:
+        return replace(found, deviation=_at_least(found, fit.prediction_error))
+    few = {0: "the picture alone", 1: "1 contact"}.get(count, f"{count} contacts")
+    untested = f"{MIN_CONTACTS} contacts are needed to test this, and there is {few}"
+    return replace(
+        found,
+        deviation=np.hypot(found.deviation, np.where(found.known_by == TOUCHED, 0.0, ASSUMED_DEVIATION)),
+        not_bounded=tuple(axis for axis in "xyz" if axis in {*found.not_bounded, *fit.open_axes}),
+        flags=(*found.flags, reason or f"assuming a household shape: {untested}"),
+    )
 
 
 def rejection_reason(fit: Candidate, smooth: Candidate | None) -> str | None:
@@ -103,7 +112,8 @@ def rejection_reason(fit: Candidate, smooth: Candidate | None) -> str | None:
             f"the best household shape misses or adds {100.0 * fit.outline_error:.0f} % of the outline in "
             f"the picture, and at most {100.0 * MAX_OUTLINE_ERROR:.0f} % are the camera's error"
         )
-    beyond = _number(details, "beyond_m")
+    beyond = details["beyond_m"]
+    assert isinstance(beyond, float)
     if not details["sighted"] and beyond > MAX_BEYOND and count >= BLIND_CONTACTS:
         return f"the household shape lies {beyond * 1e3:.0f} mm beyond {count} contacts on average"
     if smooth is not None and fit.misfit > smooth.misfit + FAMILY_ODDS:
@@ -128,35 +138,10 @@ def _as_smooth(smooth: Candidate, flags: tuple[str, ...], reason: str) -> ShapeE
     )
 
 
-def _as_family(fit: Candidate, reason: str | None) -> ShapeEstimate:
-    """The family's answer, with the deviation and the open axes of what is only assumed."""
-    found, count = fit.estimate, len(fit.left_out)
-    if count >= MIN_CONTACTS and reason is None:
-        return replace(found, deviation=_at_least(found, fit.prediction_error))
-    deviation = np.hypot(found.deviation, np.where(found.known_by == TOUCHED, 0.0, ASSUMED_DEVIATION))
-    return replace(
-        found,
-        deviation=deviation,
-        not_bounded=tuple(axis for axis in "xyz" if axis in {*found.not_bounded, *fit.open_axes}),
-        flags=(*found.flags, reason or _assumption(count)),
-    )
-
-
-def _assumption(contacts: int) -> str:
-    few = "the picture alone" if contacts == 0 else "1 contact" if contacts == 1 else f"{contacts} contacts"
-    return f"assuming a household shape: {MIN_CONTACTS} contacts are needed to test this, and there is {few}"
-
-
 def _at_least(found: ShapeEstimate, error: float) -> FloatArray:
     """``(vertices,)`` m: no part that was not touched is surer than predictions of left-out contacts are."""
     floor = np.where(found.known_by == TOUCHED, 0.0, error)
     return np.asarray(np.maximum(found.deviation, floor))
-
-
-def _number(details: Mapping[str, object], name: str) -> float:
-    value = details[name]
-    assert isinstance(value, float)
-    return value
 
 
 def folds_of(contacts: int) -> list[list[int]]:

@@ -24,7 +24,7 @@ from experiments.shape_reconstruction.family.estimate import (
 )
 from experiments.shape_reconstruction.family.freedom import STRAINED
 from experiments.shape_reconstruction.family.observed import directions_of
-from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
+from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import ANEW, FamilySettings
 from experiments.shape_reconstruction.fusion.acceptance import (
     MAX_OUTLINE_ERROR,
@@ -63,9 +63,8 @@ def reconstruct_with_prior(evidence: ShapeEvidence, settings: FamilySettings | N
         OutOfDomain: nothing was touched or seen.
     """
     if not evidence.contacts:
-        prior = _prior(evidence)
-        if prior is not None:
-            return choose(None, None, prior)
+        with suppress(FitRefused):  # the prior may not apply
+            return by_glanced_surface(evidence)
     return reconstruct(evidence, settings)
 
 
@@ -105,14 +104,6 @@ def reconstruct(
     return replace(found, seconds=seconds, details=details)
 
 
-def _prior(evidence: ShapeEvidence) -> ShapeEstimate | None:
-    """The single-view prior; None where it does not apply."""
-    try:
-        return by_glanced_surface(evidence)
-    except FitRefused:
-        return None
-
-
 def _smooth(evidence: ShapeEvidence) -> Candidate | None:
     """The smooth surface that predicts left-out contacts best; None where there is none."""
     found: list[Candidate] = []
@@ -144,7 +135,10 @@ def _search(evidence: ShapeEvidence, settings: FamilySettings, smooth: Candidate
     many = len(evidence.contacts) >= MIN_CONTACTS
     least = 1 if evidence.sighted or not many else BLIND_SEARCHES
     for more in range(1, SEARCHES):
-        unsure = _is_undecided(best) if many else _strain_of(best) > UNEASY
+        classes = best.estimate.details["classes"]
+        assert isinstance(classes, Mapping)
+        rivals = sum(weight >= RIVAL for weight in classes.values())
+        unsure = rivals > 1 if many else _strain_of(best) > UNEASY
         again = _is_poor(best) or (more == least and unsure)
         if more >= least and not again:
             break
@@ -191,13 +185,6 @@ def _is_poor(found: Candidate) -> bool:
     return typical > LOOSE or _strain_of(found) > STRAINED or found.outline_error > MAX_OUTLINE_ERROR
 
 
-def _is_undecided(found: Candidate) -> bool:
-    """True where the readings fit two classes alike."""
-    classes = found.estimate.details["classes"]
-    assert isinstance(classes, Mapping)
-    return bool(sum(weight >= RIVAL for weight in classes.values()) > 1)
-
-
 def _strain_of(found: Candidate) -> float:
     strain = found.estimate.details["strain"]
     assert isinstance(strain, float)
@@ -233,12 +220,18 @@ def predict_left_out(found: ShapeEstimate, evidence: ShapeEvidence) -> FloatArra
         ``(contacts,)`` rms distance of each from the surface fitted and bent to the others, m.
     """
     contacts = evidence.contacts
+    stated: Sequence[Mapping[str, Any]] = found.details["hypotheses"]  # type: ignore[assignment]
     errors = np.zeros(len(contacts))
     for fold in folds_of(len(contacts)):
         kept = evidence.without(fold)
         search = FamilySearch(kept, FamilySettings())
-        best = min((_fitted_again(search, one) for one in _hypotheses(found)), key=lambda one: one.cost)
-        shape = best.shape
+        fits = []
+        for one in stated[:HYPOTHESES]:
+            code, numbers = np.array(one["code"], np.int64), np.array(one["numbers"], np.float64)
+            begun = FamilyShape(str(one["class"]), code, numbers)
+            hypothesis = search.seeded(begun, np.array(one["drawn_about"]))
+            fits.append(search.refined(hypothesis, ROUNDS, last=True))
+        shape = min(fits, key=lambda one: one.cost).shape
         bent_to = moved_points(shape, kept, np.ones(len(kept.contacts), bool))
         typical = contact_fit(shape, search.full).typical
         far = float(np.sqrt(np.mean(np.sum(bent_to[1] ** 2, axis=1)))) if typical > OUTSIDE else 0.0
@@ -249,17 +242,6 @@ def predict_left_out(found: ShapeEstimate, evidence: ShapeEvidence) -> FloatArra
             moved = displacement(bent_to[0] - bent_to[1], bent_to[1], sigma, points - offsets, far)
             errors[k] = float(np.sqrt(np.mean(np.sum((offsets - moved) ** 2, axis=1))))
     return errors
-
-
-def _hypotheses(found: ShapeEstimate) -> Sequence[Mapping[str, Any]]:
-    stated: Sequence[Mapping[str, Any]] = found.details["hypotheses"]  # type: ignore[assignment]
-    return stated[:HYPOTHESES]
-
-
-def _fitted_again(search: FamilySearch, stated: Mapping[str, Any]) -> Hypothesis:
-    code, numbers = np.array(stated["code"], np.int64), np.array(stated["numbers"], np.float64)
-    begun = search.seeded(FamilyShape(str(stated["class"]), code, numbers), np.array(stated["drawn_about"]))
-    return search.refined(begun, ROUNDS, last=True)
 
 
 def outline_error(mesh: Mesh, look: SeenMask | None) -> float:

@@ -14,7 +14,7 @@ from experiments.scale_estimation.unseen.answer import (
 )
 from experiments.scale_estimation.unseen.contact_set import MOST, GelWay
 from experiments.scale_estimation.unseen.contact_set import features as features_of_ways
-from experiments.scale_estimation.unseen.network import by_strikes, by_ways, shipped
+from experiments.scale_estimation.unseen.network import by_ways, shipped
 from experiments.scale_estimation.unseen.spectrogram import BANDS, features
 from experiments.scale_estimation.unseen.training.contact_samples import TouchableShape, contact_sample
 from harness.basics.arrays import FloatArray
@@ -98,7 +98,7 @@ def test_silence_is_finite_and_no_strike_is_no_answer() -> None:
     bands, extras = features(np.zeros((1, 4800)), RATE, BAND, CERAMIC)
     assert np.isfinite(bands).all()
     assert np.isfinite(extras).all()
-    belief, _ = by_strikes(np.zeros((1, 4800)), RATE, BAND, CERAMIC, RANGE)
+    belief, _ = shipped("sound").belief([{"bands": bands, "extras": extras}], RANGE)
     assert np.isfinite(belief.log_density).all()
     with pytest.raises(FitRefused, match="strike the object"):
         strikes_alone([], CERAMIC, RANGE)

@@ -14,9 +14,14 @@ from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows
 from experiments.shape_reconstruction.family.observed import PASS, FamilyEvidence, observe
 from experiments.shape_reconstruction.family.posterior import mixture_of
 from experiments.shape_reconstruction.family.proposals import guides_of, lay
-from experiments.shape_reconstruction.family.refine import PriorRows, cheapest, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
-from experiments.shape_reconstruction.family.search import FamilySearch
+from experiments.shape_reconstruction.family.search import (
+    FamilySearch,
+    PriorRows,
+    cheapest,
+    refine,
+    total_cost,
+)
 from experiments.shape_reconstruction.family.settings import LEVELS
 from harness.basics.geometry import apply, transform, translation
 from tests.support.family_readings import made, nudged

@@ -11,7 +11,7 @@ from experiments.shape_reconstruction.family.classes import (
     rarity_of_size,
     size_of,
 )
-from experiments.shape_reconstruction.family.freedom import sizes_of
+from experiments.shape_reconstruction.family.freedom import SIZES
 from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
 from tests.support.family_shapes import surface_of
@@ -23,7 +23,7 @@ ORDINARY, RARE = 3.0, 5.0
 
 def scaled(shape: FamilyShape, factor: float) -> FamilyShape:
     theta = shape.theta.copy()
-    theta[list(sizes_of(shape.code))] += np.log(factor)
+    theta[list(SIZES[int(shape.code[layout.KIND])])] += np.log(factor)
     return FamilyShape(shape.name, shape.code, theta)
 
 

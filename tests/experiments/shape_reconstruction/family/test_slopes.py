@@ -22,7 +22,6 @@ from experiments.shape_reconstruction.family.residuals import (
     frozen,
     hold_rays,
     prepared_room,
-    row_count,
     rows_for,
     slopes_along,
 )
@@ -59,7 +58,7 @@ def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: s
     contacts, count = rows < contact_row_count(seen), len(seen.supposed)
     assert (rows[contacts] >= len(seen.points) + 3 * len(seen.middles)).any()
     assert np.array_equal(again.values[rows][contacts], moved[contacts])
-    assert 0 < count == np.sum(rows >= row_count(seen) - count)
+    assert 0 < count == np.sum(rows >= len(rows_for(seen).values) - count)
     assert np.array_equal(again.values[-count:], moved[-count:])
     rows, contacts, base, moved = rows[:-count], contacts[:-count], base[:-count], moved[:-count]
     # Along a flat side a ray's nearest place jumps as the shape moves: held there, it is off by that.
@@ -85,7 +84,7 @@ def test_the_slope_along_every_direction_is_that_of_its_rows(name: str) -> None:
     slopes = slopes_along(shape.code, theta, seen, basis, rows, out, q)
     base, moved = np.empty(len(rows)), np.empty(len(rows))
     frozen(shape.code, theta, seen, rows, out, False, q, base)
-    ends = (contact_row_count(seen), first_ray(seen), first_supposed(seen), row_count(seen))
+    ends = (contact_row_count(seen), first_ray(seen), first_supposed(seen), len(rows_for(seen).values))
     kinds = np.searchsorted(ends, rows, side="right")
     assert set(kinds) == {0, 1, 2, 3}
     for direction, slope in zip(basis, slopes, strict=True):
