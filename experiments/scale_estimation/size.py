@@ -126,7 +126,7 @@ class Belief:
         found = np.where(self.range.possible, np.exp(self.log_density), 0.0)
         total = found.sum()
         if total > 0.0:
-            return found / total
+            return np.asarray(found / total)
         # Nothing inside: the border nearest to what is believed.
         inside, best = np.flatnonzero(self.range.possible), int(np.argmax(self.log_density))
         found[inside[0] if best < inside[0] else inside[-1]] = 1.0

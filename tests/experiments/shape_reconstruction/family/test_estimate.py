@@ -15,11 +15,12 @@ from experiments.shape_reconstruction.family.estimate import (
     BLIND,
     LOOSE,
     NOISE,
-    _contact_flags,
+    _flags,
     _outliers,
     family_estimate,
 )
-from experiments.shape_reconstruction.family.freedom import STRAINED
+from experiments.shape_reconstruction.family.freedom import STRAINED, Strain
+from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.metric import shape_error
 from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
@@ -253,7 +254,8 @@ def test_a_contact_that_does_not_fit_is_named_with_the_reason(
     bad = np.arange(8) < doubtful
     fit = ContactFit(np.ones(8), np.where(bad, 4e-3, 0.3e-3), bad, 0.0)
     evidence = cast(ShapeEvidence, SimpleNamespace(contacts=[SimpleNamespace(index=k) for k in range(8)]))
-    flags = " ".join(_contact_flags(evidence, fit, _outliers(fit), finer))
+    mixture, settings = cast(Mixture, SimpleNamespace(by_class=dict)), LEVELS["coarse" if finer else "fine"]
+    flags = " ".join(_flags(evidence, mixture, fit, Strain(0.0, ""), np.zeros(8), settings))
     assert re.search(reason, flags)
     assert bool(flags) == (doubtful > 0)
     assert ("shape.method=family-fine" in flags) == hint
