@@ -15,8 +15,8 @@ from harness.basics.npz_file import write_arrays
 from harness.basics.whole_file import write_text_whole
 from harness.bench.device import Health
 from harness.effects.accuracy import Accuracy, Level
-from harness.effects.explain import as_json
-from harness.experiment.compare import Comparison, compare, planned
+from harness.effects.explain import as_json, scene_plan
+from harness.experiment.compare import Comparison, compare
 from harness.experiment.experiment import Answering, Experiment, Scored
 from harness.experiment.truth import truth_or_notes
 from harness.recording.recording import Recording
@@ -173,7 +173,7 @@ def common(experiment: Experiment, scored: Scored) -> dict[str, Any]:
         "object": scored.run.scene.object.name,
         "mock": recording.header.mock is not None,
         "seed": recording.header.seed,
-        "plan": as_json(planned(scored.run, scored.accuracy)),
+        "plan": as_json(scene_plan(scored.run.scene, scored.run.station.gel.sensor, scored.accuracy)),
         "accuracy": dict(scored.accuracy),
         "world": None if scored.truth is None else dict(scored.truth.differences),
         "recording": str(recording.folder),

@@ -130,11 +130,6 @@ def _simulated(scored: Scored, scene: SceneFile, given: Mapping[str, Any], accur
     return Comparison(plan, evaluate(plan, sources, Store(default_folder())))
 
 
-def planned(run: RunFiles, accuracy: Accuracy) -> Plan:
-    """Which effects the scene calls for."""
-    return scene_plan(run.scene, run.station.gel.sensor, accuracy)
-
-
 def _carried(run: RunFiles, plan: Plan) -> dict[str, Any]:
     sources: dict[str, Any] = {
         "object.mesh": run.mesh,

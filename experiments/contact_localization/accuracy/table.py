@@ -45,10 +45,15 @@ from harness.effects.scene_object import named_file
 from harness.experiment.experiment import MeasuredCondition, Measurement
 
 METHODS = ("random", "geometry", "geometry + axis", "paper's touch filter", "touch")
+
+
 HEARD = ("paper's MFCC filter", "audio", "both")
 """The methods that need strikes."""
 
+
 PAPER: Setting = {METHOD.name: "particle", PARTICLES.name: 1000, SENSES.name: "touch"}
+
+
 _SETTINGS: dict[str, Setting] = {
     "paper's touch filter": PAPER,
     **{senses: {SENSES.name: senses} for senses in SENSES.levels},
@@ -86,7 +91,15 @@ def _scored(method: str, readings: Readings, true: FloatArray, symmetry: Symmetr
         point = without_images(poses, readings.model, readings.prior, SPACING.default, axis)
         return _errors(point, true, symmetry, now() - start)
     if method == "paper's MFCC filter":
-        return _errors(_by_mfcc(readings), true, symmetry, now() - start)
+        model, strikes = readings.model, [observation.strike for observation in readings.observations]
+        assert model.modes is not None
+        assert model.material is not None
+        spacing, rate = SPACING.default, next(strike.rate for strike in strikes if strike is not None)
+        table = MfccTable(model.gains(spacing), model.modes, model.material, rate)
+        contacts = [Contact(observation.base_from_gel) for observation in readings.observations]
+        search = Search(contacts, model, readings.prior, spacing, noise_at(model.errors))
+        particles = mfcc_filter(search, table, strikes, accuracy_at(PAPER).of(PARTICLES), readings.seed)
+        return _errors(particles.candidates().mean(axis=0), true, symmetry, now() - start)
     return _estimated(readings, _SETTINGS[method], true, symmetry)
 
 
@@ -106,19 +119,6 @@ def _settings(
     networks = [networks_of(named_file(scene).description) for scene in named]
     shared = frozenset.intersection(*networks) if len(named) == len(scenes) else frozenset()
     return settings(thorough, _heard(chosen), shared)
-
-
-def _by_mfcc(readings: Readings) -> FloatArray:
-    """``(3,)`` metres: the mean of the paper's filter's most probable distinct particles."""
-    model, strikes = readings.model, [observation.strike for observation in readings.observations]
-    assert model.modes is not None
-    assert model.material is not None
-    spacing, rate = SPACING.default, next(strike.rate for strike in strikes if strike is not None)
-    table = MfccTable(model.gains(spacing), model.modes, model.material, rate)
-    contacts = [Contact(observation.base_from_gel) for observation in readings.observations]
-    search = Search(contacts, model, readings.prior, spacing, noise_at(model.errors))
-    particles = mfcc_filter(search, table, strikes, accuracy_at(PAPER).of(PARTICLES), readings.seed)
-    return np.asarray(particles.candidates().mean(axis=0))
 
 
 def _estimated(
@@ -167,6 +167,7 @@ PAPER_CM = {
 }
 """ObjectFolder 2.0, table 4: mean error in cm over six objects of theirs, 5 to 7 contacts; the last two
 objects were not struck in reality."""
+
 
 MEASUREMENT = Measurement(
     estimator=ESTIMATOR,

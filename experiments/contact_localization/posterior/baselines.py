@@ -112,9 +112,9 @@ def mel_weights(rate: float, size: int, settings: Mfcc) -> FloatArray:
     Raises:
         WrongUse: a band so narrow that no line falls into it.
     """
-    edges = _hertz(
-        np.linspace(_mel(settings.lowest), _mel(min(settings.highest, 0.5 * rate)), settings.bands + 2)
-    )
+    highest = min(settings.highest, 0.5 * rate)
+    mels = np.linspace(_mel(settings.lowest), _mel(highest), settings.bands + 2)
+    edges = np.asarray(700.0 * (10.0 ** (mels / 2595.0) - 1.0))
     lines = rfftfreq(size, 1.0 / rate)
     rising = (lines - edges[:-2, None]) / (edges[1:-1] - edges[:-2])[:, None]
     falling = (edges[2:, None] - lines) / (edges[2:] - edges[1:-1])[:, None]
@@ -230,7 +230,3 @@ def _frames(rate: float, settings: Mfcc) -> int:
 
 def _mel(hertz: float) -> float:
     return float(2595.0 * np.log10(1.0 + hertz / 700.0))
-
-
-def _hertz(mels: FloatArray) -> FloatArray:
-    return np.asarray(700.0 * (10.0 ** (mels / 2595.0) - 1.0))

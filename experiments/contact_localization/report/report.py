@@ -96,9 +96,16 @@ def report_of(scored: Scored, comparison: Comparison, health: Mapping[str, Healt
         health: of the instruments at the end of the session; None for a replay.
     """
     run, found, true = scored.run, scored.found, true_points(scored)
+    # The estimator's side of what the world did differently.
+    ours = {
+        "mesh_vertices, the estimator's": str(len(run.mesh.vertices)),
+        "mesh_faces, the estimator's": str(len(run.mesh.faces)),
+        "optics_level, the comparison's": str(scored.accuracy.get("touch.optics", "")),
+        "calibration_sha256, the estimator's": run.calibration.sha256,
+    }
     history = scored.answering.history(found.last, found.sense)
     return ReportData(
-        **facts_of("Contact localization", scored, comparison, health, _ours(scored)),
+        **facts_of("Contact localization", scored, comparison, health, ours),
         mesh=run.mesh,
         answer=_answer(scored),
         contacts=_contacts(scored, comparison, history),
@@ -254,16 +261,6 @@ def _by_seconds(tried: tuple[SweepPoint, ...]) -> tuple[ErrorCurve, ...] | Missi
     )
 
 
-def _ours(scored: Scored) -> dict[str, str]:
-    """The estimator's side of what the world did differently."""
-    return {
-        "mesh_vertices, the estimator's": str(len(scored.run.mesh.vertices)),
-        "mesh_faces, the estimator's": str(len(scored.run.mesh.faces)),
-        "optics_level, the comparison's": str(scored.accuracy.get("touch.optics", "")),
-        "calibration_sha256, the estimator's": scored.run.calibration.sha256,
-    }
-
-
 def trade(readings: Readings, true: FloatArray) -> tuple[SweepPoint, ...]:
     """Estimate the same readings again at every level; a level that refuses the fit is left out.
 
@@ -286,13 +283,6 @@ def trade(readings: Readings, true: FloatArray) -> tuple[SweepPoint, ...]:
 _MOST_POSES = 200
 
 
-def _pressed(run: RunFiles, index: int) -> FloatArray:
-    """``(4, 4)`` ``base_from_gel`` of a contact that was chosen on the way, fully pressed, as planned."""
-    motion = ContactMotion.from_parameters(run.recording.step(index).step.parameters)
-    along = translation((motion.search + motion.press) * motion.axis)
-    return np.asarray(along @ motion.base_from_stand_off @ run.station.flange_from_gel)
-
-
 def deviations(run: RunFiles, found: Answer) -> tuple[TwinDeviation, ...]:
     """By step: the controller's poses against the twin's, and the contact against the rehearsed one."""
     bench = twin_of(run.scene, run.station, run.mesh)
@@ -305,7 +295,12 @@ def deviations(run: RunFiles, found: Answer) -> tuple[TwinDeviation, ...]:
         chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_POSES)).astype(np.int64))
         matrices = np.array([transform(rotation_from_quaternion(p[3:]), p[:3]) for p in poses[chosen]])
         arm = compare_arm(run.station.arm.model, joints[chosen], matrices)
-        pressed = np.array(planned[index]) if index < len(planned) else _pressed(run, index)
+        if index < len(planned):
+            pressed = np.array(planned[index])
+        else:  # chosen on the way: fully pressed, as planned then
+            motion = ContactMotion.from_parameters(run.recording.step(index).step.parameters)
+            along = translation((motion.search + motion.press) * motion.axis)
+            pressed = along @ motion.base_from_stand_off @ run.station.flange_from_gel
         rehearsed = predict_contact(bench, index, pressed)
         contact = compare_contact(bench, rehearsed, observation.base_from_gel).distance
         rows.append(

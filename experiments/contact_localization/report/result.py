@@ -106,7 +106,7 @@ def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
     """An estimate by one sense or by both, scored where the truth is known."""
     true = true_points(scored)
     errors = None if true is None else np.linalg.norm(last.contacts - true, axis=1)
-    end = None if true is None else true[-1]
+    end, refused = None if true is None else true[-1], scored.found.refused_pictures
     return {
         "position_m": last.position_in_object.tolist(),
         "error_m": None if errors is None else float(errors[-1]),
@@ -129,13 +129,13 @@ def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
         "yaw_rad": last.yaw,
         "yaw_sigma_rad": last.yaw_sigma,
         "contacts": [
-            _contact(
-                k,
-                point,
-                last.gates[k] if last.gates else None,
-                None if errors is None else float(errors[k]),
-                scored.found.refused_pictures.get(k),
-            )
+            {
+                "contact": k + 1,
+                "position_m": point.tolist(),
+                "error_m": None if errors is None else float(errors[k]),
+                "fit_nats": fit_of(last.gates[k]) if last.gates else None,
+                "flags": flags_of(last.gates[k], refused.get(k)) if last.gates else [],
+            }
             for k, point in enumerate(last.contacts)
         ],
         "seconds": sum(last.seconds.values()),
@@ -165,18 +165,6 @@ def flags_of(gate: Gate, refusal: str | None = None) -> list[str]:
 def fit_of(gate: Gate) -> float | None:
     """Nats; None where there is no image or, as JSON has no infinity, where the contact fits nowhere near."""
     return gate.fit if gate.fit is not None and np.isfinite(gate.fit) else None
-
-
-def _contact(
-    index: int, point: FloatArray, gate: Gate | None, error: float | None, refusal: str | None
-) -> dict[str, Any]:
-    return {
-        "contact": index + 1,
-        "position_m": point.tolist(),
-        "error_m": error,
-        "fit_nats": None if gate is None else fit_of(gate),
-        "flags": [] if gate is None else flags_of(gate, refusal),
-    }
 
 
 def answer_lines(result: Mapping[str, Any]) -> list[str]:
