@@ -19,7 +19,7 @@ MOST_DATA = 2**29
 _MOST_LISTED = 2**23
 """Bytes of the list of an archive's members: some 100,000 of them."""
 
-_ZIP_TAIL = 2**16 + 22 + 20
+_ZIP_TAIL = 2**16 + 22 + 20 + 56
 """Bytes at the end of an archive that hold where its list is."""
 
 
@@ -72,11 +72,16 @@ def require_unpackable(path: Path, what: str, refused: type[TouchstoneError] = D
     """
     require_readable(path, what, MOST_DATA, refused)
     with path.open("rb") as stream:
-        stream.seek(max(0, path.stat().st_size - _ZIP_TAIL))
+        begin = stream.seek(max(0, path.stat().st_size - _ZIP_TAIL))
         tail = stream.read()
     end = tail.rfind(b"PK\x05\x06")
     listed = int.from_bytes(tail[end + 12 : end + 16], "little") if end >= 0 else 0
-    if listed > _MOST_LISTED or (end >= 20 and tail[end - 20 : end - 16] == b"PK\x06\x07"):
+    if end >= 20 and tail[end - 20 : end - 16] == b"PK\x06\x07":
+        # A ZIP64 archive, which torch always writes, states the size in a record before the locator of it.
+        record, place = tail[max(0, end - 76) : end - 20], int.from_bytes(tail[end - 12 : end - 4], "little")
+        known = len(record) == 56 and record[:4] == b"PK\x06\x06" and place == begin + end - 76
+        listed = int.from_bytes(record[40:48], "little") if known else _MOST_LISTED + 1
+    if listed > _MOST_LISTED:
         raise refused(f"{path} lists far more members than {what} has; pack it again")
     with zipfile.ZipFile(path) as archive:
         size = sum(member.file_size for member in archive.infolist())

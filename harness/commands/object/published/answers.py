@@ -14,9 +14,7 @@ from harness.commands.object.published.built import (
     require_built,
 )
 from harness.commands.object.published.files import AUDIO, TOUCH, VISION, AnsweredQueries, QueryFiles
-from harness.commands.object.published.sounds import sounds_written
-from harness.commands.object.published.touches import touches_written
-from harness.commands.object.published.views import views_written
+from harness.commands.object.published.imported import sounds_written, touches_written, views_written
 
 if TYPE_CHECKING:
     from harness.basics.arrays import FloatArray
@@ -106,7 +104,7 @@ def _require_senses(of: "PublishedObject", given: QueryFiles) -> None:
 
 
 def _sound_rows(given: QueryFiles) -> "tuple[FloatArray, ...] | None":
-    from harness.objectfile.published.queries import read_rows, require_pairs
+    from harness.objectfile.published.query import read_rows, require_pairs
 
     if given.audio_vertices is None or given.audio_forces is None:
         return None
@@ -117,7 +115,7 @@ def _sound_rows(given: QueryFiles) -> "tuple[FloatArray, ...] | None":
 
 
 def _touch_rows(given: QueryFiles) -> "tuple[FloatArray, ...] | None":
-    from harness.objectfile.published.queries import read_rows, require_pairs
+    from harness.objectfile.published.query import read_rows, require_pairs
 
     if given.touch_vertices is None:
         return None
@@ -130,7 +128,7 @@ def _touch_rows(given: QueryFiles) -> "tuple[FloatArray, ...] | None":
 
 
 def _view_rows(given: QueryFiles) -> "tuple[FloatArray, ...] | None":
-    from harness.objectfile.published.queries import read_rows
+    from harness.objectfile.published.query import read_rows
 
     return None if given.vision is None else (read_rows(given.vision, 6, "camera x y z and light x y z"),)
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from harness.basics.errors import WrongUse
 from harness.commands.object.published.files import AUDIO, TOUCH, VISION, AnsweredQueries, QueryFiles
-from harness.commands.object.published.sounds import require_room, write_alike, write_float
+from harness.commands.object.published.imported import require_room, write_alike, write_float
 
 if TYPE_CHECKING:
     from harness.basics.arrays import FloatArray

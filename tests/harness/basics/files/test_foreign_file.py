@@ -1,5 +1,6 @@
 """Files that somebody else wrote are read within bounds, or refused in a sentence that names them."""
 
+import struct
 import tracemalloc
 import zipfile
 from pathlib import Path
@@ -104,6 +105,31 @@ def test_our_own_refusals_go_through() -> None:
         raise WrongUse("ours")
     with pytest.raises(DataRefused, match="theirs"), refused_as(DataRefused, "theirs"):
         raise RecursionError
+
+
+@pytest.mark.parametrize(
+    ("listed", "place", "fits"),
+    [(None, None, True), (2**24, None, False), (None, 0, False)],
+    ids=["as torch writes it", "a list too long", "a record elsewhere"],
+)
+def test_an_archive_of_zip64_is_bounded_by_its_own_record(
+    tmp_path: Path, listed: int | None, place: int | None, fits: bool
+) -> None:
+    path = tmp_path / "some.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("a.bin", bytes(10))
+    data = path.read_bytes()
+    end = data.rfind(b"PK\x05\x06")
+    count, size, start = struct.unpack("<HLL", data[end + 10 : end + 20])
+    size = size if listed is None else listed
+    record = struct.pack("<4sQ2H2L4Q", b"PK\x06\x06", 44, 45, 45, 0, 0, count, count, size, start)
+    locator = struct.pack("<4sLQL", b"PK\x06\x07", 0, end if place is None else place, 1)
+    path.write_bytes(data[:end] + record + locator + data[end:])
+    if fits:
+        require_unpackable(path, "an archive")
+    else:
+        with pytest.raises(DataRefused, match="lists far more members"):
+            require_unpackable(path, "an archive")
 
 
 @pytest.mark.parametrize(("sizes", "fits"), [([400, 400], True), ([400, 400, 400], False), ([1100], False)])

@@ -8,8 +8,7 @@ import pytest
 
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.objectfile.published.camera import views_of
-from harness.objectfile.published.queries import read_rows, require_pairs
-from harness.objectfile.published.query import require_in_box
+from harness.objectfile.published.query import read_rows, require_in_box, require_pairs
 from tests.oracles import objectfolder_formulas as formulas
 
 

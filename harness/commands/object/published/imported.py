@@ -1,18 +1,26 @@
-"""Sounds of an imported object as files: ours, which compare with one another, or the published program's."""
+"""Query files answered by an imported object: sounds, touches and pictures as files."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.basics.errors import WrongUse
-from harness.commands.object.published.files import AUDIO, AnsweredQueries, QueryFiles
+from harness.commands.object.published.files import AUDIO, TOUCH, VISION, AnsweredQueries, QueryFiles
 
 if TYPE_CHECKING:
     from harness.basics.arrays import FloatArray
-    from harness.objectfile.published.entries import PublishedGainsEntry, PublishedSpectrumEntry
+    from harness.objectfile.published.entries import (
+        PublishedColoursEntry,
+        PublishedDepthEntry,
+        PublishedGainsEntry,
+        PublishedSpectrumEntry,
+    )
     from harness.objectfile.published.folder import PublishedObject
 
 _MOST_SAMPLES = 2**28
 """Of all sounds together, 2 GB: they are written with one full scale."""
+
+_CENTRE = 0.5
+"""Pixels from the corner of a pixel to its centre."""
 
 
 def sounds_written(
@@ -117,3 +125,96 @@ def write_float(paths: list[Path], sounds: "FloatArray", rate: float) -> None:
 
     for path, sound in zip(paths, sounds, strict=True):
         wavfile.write(path, round(rate), sound.astype(np.float32))
+
+
+def touches_written(
+    of: "PublishedObject", rows: "tuple[FloatArray, ...]", given: QueryFiles, out: Path, into: AnsweredQueries
+) -> None:
+    """Write ``1.npy`` and ``1.png`` and so on; ``rows`` are vertices and, of 2.0, presses."""
+    depth, colours = of.description.touch_depth, of.description.touch_colours
+    if depth is not None:
+        into.files[TOUCH] = _maps(of, depth, rows, given, out, into)
+    else:
+        assert colours is not None
+        into.files[TOUCH] = _pictures(of, colours, rows[0], given, out, into)
+
+
+def _maps(
+    of: "PublishedObject",
+    entry: "PublishedDepthEntry",
+    rows: "tuple[FloatArray, ...]",
+    given: QueryFiles,
+    out: Path,
+    into: AnsweredQueries,
+) -> list[Path]:
+
+    from harness.basics.npz_file import write_array
+    from harness.objectfile.published.taxim_picture import TaximPicture
+    from harness.objectfile.published.touch import open_depths
+    from harness.picture.image_file import write_png
+
+    vertices, gel = rows
+    size = (entry.rows, entry.columns)
+    optics = None if given.calibration is None else TaximPicture.open(given.calibration, size)
+    if optics is None:
+        into.notes.append(
+            "maps alone, metres from the gel's camera: for pictures give --calibration, the folder `calibs` "
+            "that "
+            "ObjectFolder 2.0 publishes"
+        )
+    written = []
+    for number, (depth, press) in enumerate(
+        zip(open_depths(of, entry).maps(vertices, gel), gel, strict=True), start=1
+    ):
+        written.append(out / f"{number}.npy")
+        write_array(written[-1], depth)
+        if optics is not None:
+            draw = optics.compat_image if given.compat else optics.image
+            written.append(out / f"{number}.png")
+            write_png(written[-1], draw(depth, float(press[2])))
+    return written
+
+
+def _pictures(
+    of: "PublishedObject",
+    entry: "PublishedColoursEntry",
+    vertices: "FloatArray",
+    given: QueryFiles,
+    out: Path,
+    into: AnsweredQueries,
+) -> list[Path]:
+    from harness.objectfile.published.touch import open_colours
+    from harness.picture.image_file import write_png
+
+    if given.compat:
+        into.notes.append(
+            "coordinates were normalised by the least and greatest of these vertices, as the program of "
+            "ObjectFolder 1.0 does: a vertex looks otherwise in other company"
+        )
+    written = []
+    for number, image in enumerate(open_colours(of, entry).images(vertices, given.compat), start=1):
+        written.append(out / f"{number}.png")
+        write_png(written[-1], image)
+    return written
+
+
+def views_written(
+    of: "PublishedObject", rows: "tuple[FloatArray, ...]", given: QueryFiles, out: Path, into: AnsweredQueries
+) -> None:
+    """Write ``000.png`` and so on; ``rows`` are cameras and lights."""
+    import numpy as np
+
+    from harness.objectfile.published.camera import views_of
+    from harness.objectfile.published.look import open_look
+    from harness.picture.image_file import write_png
+
+    entry = of.description.vision
+    assert entry is not None
+    cube = None if entry.cells is None else np.array([entry.cells.low, entry.cells.high])
+    reach = entry.near if cube is None else float(np.linalg.norm(np.abs(cube).max(axis=0)))
+    views, look, written = views_of(rows[0], reach, given.compat), open_look(of, entry), []
+    for number, view in enumerate(views):
+        picture = look.picture(view, given.size, 0.0 if given.compat else _CENTRE)
+        written.append(out / f"{number:03d}.png")
+        write_png(written[-1], picture.truncated() if given.compat else picture.rounded())
+    into.files[VISION] = written
