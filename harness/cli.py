@@ -8,9 +8,9 @@ import json
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import wraps
 from inspect import cleandoc, signature
 from typing import Annotated, Any
@@ -40,11 +40,20 @@ PROGRAM = "touchstone"
 
 @dataclass(frozen=True)
 class Command:
-    """Where a command lives, and what it is for."""
+    """Where a command lives, and what it is for.
+
+    Attributes:
+        target: module and name of its function.
+        summary: beside its name in help.
+        removed: options that it had, each with what to do instead.
+    """
 
     target: str
     summary: str
+    removed: Mapping[str, str] = field(default_factory=dict)
 
+
+ONE_SAMPLE = "there is one way to a picture, one sample a ray where it meets the surface"
 
 COMMANDS = {
     "demo": Command(
@@ -85,6 +94,7 @@ COMMANDS = {
     "object build": Command(
         "harness.commands.object.build:build",
         "Build an object's sound, touch or look: networks, and what they are off by.",
+        {"--finish": "networks no longer learn from pictures; say --profile paper for larger ones"},
     ),
     "object info": Command(
         "harness.commands.object.object:info",
@@ -109,6 +119,10 @@ COMMANDS = {
     "object render vision": Command(
         "harness.commands.object.render_vision:render",
         "Render a picture from any side in any light, or a turntable of them, by the networks.",
+        {
+            "--level": f"{ONE_SAMPLE}; leave --level out, and say --rays 2 for a finer picture",
+            "--compare": f"{ONE_SAMPLE}; `touchstone cost vision` compares it with exact pictures",
+        },
     ),
     "object view": Command(
         "harness.commands.object.view:view",
@@ -117,6 +131,7 @@ COMMANDS = {
     "object compare vision": Command(
         "harness.commands.object.compare_vision:compare",
         "A camera's picture beside the networks': exposure and white balance fitted, what is left.",
+        {"--level": f"{ONE_SAMPLE}; leave --level out"},
     ),
     "object verify": Command(
         "harness.commands.object.object:verify", "Check an ObjectFile: hashes, graphs, shapes, known answers."
@@ -219,6 +234,7 @@ def invoke(arguments: list[str]) -> int:
 
 def _ended(arguments: list[str], as_json: bool) -> int:
     try:
+        _refuse_removed(arguments)
         result = _app(_chosen(_completed() or arguments))(arguments, standalone_mode=False, prog_name=PROGRAM)
     except TouchstoneError as error:
         return _report(str(error), error.kind(), error.exit_code, as_json)
@@ -239,6 +255,14 @@ def _ended(arguments: list[str], as_json: bool) -> int:
         sys.stderr.write(escape_controls(traceback.format_exc()))
         return _report(_unforeseen(error), UNFORESEEN, 1, as_json)
     return result if isinstance(result, int) else 0
+
+
+def _refuse_removed(arguments: Sequence[str]) -> None:
+    """Refuse an option that the command had, and name what replaced it."""
+    command = commands().get(_chosen(arguments) or "")
+    for option in (word.partition("=")[0] for word in arguments):
+        if command is not None and option in command.removed:
+            raise WrongUse(f"{option} was removed: {command.removed[option]}")
 
 
 def _completed() -> list[str]:

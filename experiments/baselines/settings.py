@@ -10,7 +10,7 @@ from typing import Final
 from harness.authoring.audio.profiles import PerceptronSpec
 from harness.authoring.touch.profiles import CodesSpec, TouchPerceptronSpec
 from harness.authoring.vision.profiles import CellsSpec
-from harness.objectfile.vision.network.network import PAPER
+from harness.objectfile.vision.network import PAPER
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """How well to compute: dials with levels, and one choice of them all."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Generic, Literal, TypeVar, cast
 
@@ -29,6 +29,7 @@ class Knob(Generic[LevelT]):
         kind: whether the levels are numbers or methods.
         default: where nobody chooses.
         meaning: what it dials, in a few words.
+        removed: levels that it had, each with what to do instead.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Knob(Generic[LevelT]):
     kind: Literal["number", "method"]
     default: LevelT
     meaning: str = ""
+    removed: Mapping[Level, str] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         if not self.levels or len(set(self.levels)) != len(self.levels):
@@ -54,6 +56,8 @@ class Knob(Generic[LevelT]):
         for known in self.levels:
             if known == level and isinstance(known, str) == isinstance(level, str):
                 return known
+        if level in self.removed:
+            raise WrongUse(f"{self.name} no longer has the level {level!r}; {self.removed[level]}")
         hint = nearest(level, map(str, self.levels)) if isinstance(level, str) else f"it has {self._listed()}"
         raise WrongUse(f"{self.name} has no level {level!r}; {hint}")
 

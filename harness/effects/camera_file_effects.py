@@ -10,46 +10,52 @@ from typing import TYPE_CHECKING, Any
 
 from harness.effects.accuracy import Knob, Level
 from harness.effects.camera_effects import effects_when
-from harness.effects.effect import Compute, Condition, Effect, Implementation
+from harness.effects.effect import Condition, Effect, Implementation
 from harness.effects.sound_effects import NAMED
 from harness.sim.solid.walls import walled
 
 if TYPE_CHECKING:
-    from harness.objectfile.vision.settings import VisionLevel
-    from harness.objectfile.vision.vision import ObjectVision
+    from harness.objectfile.vision.render import ObjectVision
 
 Given = Mapping[str, Any]
 Levels = Mapping[str, Level]
 
 LOOK = Knob(
     "camera.look",
-    ("one_sample", "onnx", "network", "direct"),
+    ("network", "direct"),
     "",
     "method",
     "direct",
-    "the ObjectFile's networks: at one sample a pixel, by their graph, by our kernel; or rays on the mesh",
+    "the ObjectFile's networks, one sample a ray; or rays on the mesh",
+    removed=dict.fromkeys(("one_sample", "onnx"), "take network, which is one sample a ray by the graph"),
 )
 
 
 def _opened(given: Given, _levels: Levels) -> "ObjectVision":
+    """Open the look of an object out of its ObjectFile.
+
+    Raises:
+        WrongUse: an ObjectFile of another object; what differs is said.
+        DataRefused: it has no look, or a file of it is damaged.
+    """
     # Loaded by those alone who take pictures from an ObjectFile.
-    from harness.objectfile.vision.level import vision_from
+    from harness.basics.errors import DataRefused
+    from harness.objectfile.same_object import require_same_shape
+    from harness.objectfile.vision.render import open_vision
 
-    return vision_from(given["object.file"], walled(given["object.mesh"], given["object.wall"]))
+    of, instead = given["object.file"], f"{LOOK.name} = direct"
+    if of.description.vision is None:
+        raise DataRefused(
+            f"{of.folder} has no vision; add it with `touchstone object build --only vision`, or take "
+            f"{instead}"
+        )
+    require_same_shape(of, walled(given["object.mesh"], given["object.wall"]), instead)
+    return open_vision(of)
 
 
-def _from_file(level: "VisionLevel") -> Implementation:
-    return Implementation(("object.vision", "camera", "camera.lights"), _picture(level), when=NAMED)
-
-
-def _picture(level: "VisionLevel") -> Compute:
-    def compute(given: Given, _levels: Levels) -> Any:
-        from harness.objectfile.vision.settings import RenderSettings
-
-        vision: ObjectVision = given["object.vision"]
-        return vision.lit(given["camera"], given["camera.lights"], RenderSettings(level=level))
-
-    return compute
+def _picture(given: Given, _levels: Levels) -> Any:
+    vision: ObjectVision = given["object.vision"]
+    return vision.lit(given["camera"], given["camera.lights"])
 
 
 def scene_camera_effects(camera: Condition, lights: Condition) -> tuple[Effect, ...]:
@@ -61,13 +67,9 @@ def scene_camera_effects(camera: Condition, lights: Condition) -> tuple[Effect, 
             behind it.
     """
     *others, image = effects_when(lights)
-    ways: dict[Level, Implementation] = {
-        "network": _from_file("fused"),
-        "onnx": _from_file("onnx"),
-        "one_sample": _from_file("one_sample"),
-    }
+    network = Implementation(("object.vision", "camera", "camera.lights"), _picture, when=NAMED)
     return (
         *others,
         Effect("object.vision", ("object.file", "object.mesh", "object.wall"), _opened, when=NAMED),
-        replace(image, when=camera, choice=LOOK, ways=ways),
+        replace(image, when=camera, choice=LOOK, ways={"network": network}),
     )

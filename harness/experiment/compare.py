@@ -23,7 +23,7 @@ from harness.effects.file_levels import NETWORK, scene_levels
 from harness.effects.plan import Plan, default_accuracy
 from harness.effects.touch_file_effects import SHAPES as TOUCH
 from harness.experiment.experiment import Experiment, Scored
-from harness.objectfile.vision.settings import Rendered
+from harness.objectfile.vision.render import Rendered
 from harness.picture.pinhole import DirectionalLight
 from harness.recording.run_folder import RunFiles
 from harness.sim.light.direct_image import DirectImage

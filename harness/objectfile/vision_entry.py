@@ -43,10 +43,10 @@ class VisionSizeEntry(Entry):
 
 
 class VisionShellEntry(Entry):
-    """How finely the surface is marched, and how far behind it the networks were made to answer.
+    """How far behind the surface the networks were made to answer.
 
     Attributes:
-        voxels_per_cell: along a side.
+        voxels_per_cell: the unit of that depth, along a side of a cell.
         deep_voxels: behind the surface.
     """
 
@@ -69,7 +69,7 @@ class VisionEntry(Entry):
         density_per_m: 1/m that a density of 1 stands for.
         grid: of cells.
         size: of each network.
-        shell: of voxels along the surface.
+        shell: in which the networks answer.
         network: the graph; errors on held-out pictures under ``measured``.
         surface: that pictures are drawn along; null where it is the mesh.
         provenance: of the look.

@@ -33,7 +33,7 @@ def openers(folder: Path) -> dict[str, Callable[[], Any]]:
     from harness.objectfile.audio.audio import open_audio
     from harness.objectfile.file import ObjectFile
     from harness.objectfile.touch.tool_depth import open_tool_depth
-    from harness.objectfile.vision.vision import open_vision
+    from harness.objectfile.vision.render import open_vision
 
     return {
         "description and mesh": lambda: ObjectFile.open(folder).mesh,

@@ -4,20 +4,18 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.mesh import Mesh
-from harness.objectfile.vision.network.graph import vision_graph
-from harness.objectfile.vision.network.network import NetworkSize, VisionGrid, VisionModel, VisionWeights
-from harness.objectfile.vision.network.plain import scatter_rows
-from harness.objectfile.vision.shell import grid_of, lattice_of, surface_shell
+from harness.objectfile.vision.graph import vision_graph
+from harness.objectfile.vision.network import (
+    NetworkSize,
+    VisionGrid,
+    VisionModel,
+    VisionWeights,
+    scatter_rows,
+)
 from harness.picture.pinhole import Pinhole
 
 SMALL = NetworkSize(width=16, octaves=2, turns=1)
 TOLD = NetworkSize(width=16, octaves=2, turns=1, kind="osf-v")
-
-
-def filled_grid(mesh: Mesh, cells: int, deep: float) -> VisionGrid:
-    """The cells that a mesh's shell of that depth passes through."""
-    lattice = lattice_of(mesh, cells)
-    return grid_of(surface_shell(mesh, lattice, deep), lattice)
 
 
 def box_grid(low: FloatArray, cell: float, sides: tuple[int, int, int]) -> VisionGrid:

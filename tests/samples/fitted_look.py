@@ -10,11 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from harness.basics.arrays import AnyArray, FloatArray, IntArray
+from harness.authoring.vision.surface_cells import surface_cells
+from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.mesh import Mesh
-from harness.objectfile.vision.network.network import NetworkSize, VisionGrid, VisionModel, VisionWeights
-from harness.objectfile.vision.network.plain import encoded, scatter_rows
-from harness.objectfile.vision.shell import PER_CELL, Shell, grid_of, lattice_of, surface_shell
+from harness.objectfile.vision.network import (
+    PER_CELL,
+    NetworkSize,
+    VisionGrid,
+    VisionModel,
+    VisionWeights,
+    scatter_rows,
+)
+from tests.oracles.plain_networks import encoded, local_places
 
 _RIDGE = 1e-3
 _OPAQUE = 40.0
@@ -65,28 +72,28 @@ def lit(albedos: FloatArray, normals: FloatArray, lights: FloatArray) -> FloatAr
 
 def fitted_look(
     mesh: Mesh, size: NetworkSize, cells: int = 16, samples: int = 400, seed: int = 0
-) -> tuple[VisionModel, Shell]:
-    """The networks of a mesh, float16, and the shell they were solved in."""
+) -> VisionModel:
+    """The networks of a mesh, float16."""
     random = np.random.default_rng(seed)
-    lattice = lattice_of(mesh, cells)
-    shell = surface_shell(mesh, lattice)
-    grid = grid_of(shell, lattice)
-    points = _in_shell(shell, grid, samples, random)
-    distance, normals, albedos = Field.of(mesh, 200_000, random).at(points.reshape(-1, 3))
+    grid = surface_cells(mesh, cells)
+    voxel = grid.cell / PER_CELL
+    field = Field.of(mesh, 200_000, random)
+    points = _beside(field, grid, samples, random)
+    distance, normals, albedos = field.at(points.reshape(-1, 3))
     lights = _unit(random.standard_normal((len(distance), 3)))
-    raw = np.clip(-distance / shell.voxel, -1.0, 1.0).reshape(points.shape[:2])
+    raw = np.clip(-distance / voxel, -1.0, 1.0).reshape(points.shape[:2])
     colours = np.clip(lit(albedos, normals, lights), 0.02, 0.98)
     logits = np.log(colours / (1.0 - colours)).reshape(*points.shape[:2], 3)
-    weights = _drawn(size, len(grid), _OPAQUE / shell.voxel, random)
+    weights = _drawn(size, len(grid), _OPAQUE / voxel, random)
     every = np.repeat(np.arange(len(grid)), samples)
-    local = grid.local(points.reshape(-1, 3), every).reshape(points.shape)
+    local = local_places(grid, points.reshape(-1, 3), every).reshape(points.shape)
     hidden, late = _hidden(weights, local, lights.reshape(points.shape))
     density, density_bias = _solved(hidden, raw[..., None])
     colour, colour_bias = _solved(late, logits)
     arrays = dict(weights.arrays()) | {
         "density": density, "density_bias": density_bias, "colour": colour, "colour_bias": colour_bias,
     }  # fmt: skip
-    return VisionModel(grid, VisionWeights(size, weights.density_scale, **arrays).rounded()), shell
+    return VisionModel(grid, VisionWeights(size, weights.density_scale, **arrays).rounded())
 
 
 def drawn_look(grid: VisionGrid, size: NetworkSize, scale: float, seed: int = 0) -> VisionModel:
@@ -94,15 +101,12 @@ def drawn_look(grid: VisionGrid, size: NetworkSize, scale: float, seed: int = 0)
     return VisionModel(grid, _drawn(size, len(grid), scale, np.random.default_rng(seed)).rounded())
 
 
-def _in_shell(shell: Shell, grid: VisionGrid, samples: int, random: np.random.Generator) -> FloatArray:
-    voxels = np.argwhere(shell.occupied)
-    owner = grid.table[tuple((voxels // PER_CELL).T)]
-    order = np.argsort(owner, kind="stable")
-    starts = np.searchsorted(owner[order], np.arange(len(grid) + 1))
-    drawn = random.random((len(grid), samples)) * np.diff(starts)[:, None]
-    chosen: IntArray = (starts[:-1, None] + drawn).astype(np.int64)
-    inside = voxels[order[chosen]] + random.random((len(grid), samples, 3))
-    points: FloatArray = shell.low + shell.voxel * inside
+def _beside(field: Field, grid: VisionGrid, samples: int, random: np.random.Generator) -> FloatArray:
+    """``(networks, samples, 3)`` m of each cell: beside the surface that is nearest to it, within a voxel."""
+    shares = random.random((len(grid), samples, 3))
+    _, near = field.tree.query(grid.low + grid.cell * (grid.cells[:, None] + shares))
+    offsets = grid.cell / PER_CELL * random.uniform(-1.0, 1.0, (*near.shape, 1))
+    points: FloatArray = field.points[near] + offsets * field.normals[near]
     return points
 
 

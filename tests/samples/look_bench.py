@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
+from harness.authoring.vision.surface_cells import surface_cells
 from harness.basics.materials import MATERIALS
 from harness.objectfile.file import ObjectFile, create_object
-from harness.objectfile.vision.network.network import VisionModel
+from harness.objectfile.vision.network import VisionModel
 from harness.objectfile.vision.part import VisionPart, with_vision
-from tests.oracles.plain_look import TOLD, even_look, filled_grid, shadow_look
+from tests.oracles.plain_look import TOLD, even_look, shadow_look
 from tests.oracles.seen_shapes import cuboid
 from tests.samples.object_bench import PROVENANCE
 
@@ -17,12 +18,12 @@ OPAQUE = 1e6
 
 def box_look(density: float = OPAQUE) -> VisionModel:
     """The same colour everywhere within the box's shell."""
-    return even_look(filled_grid(BOX, 8, 1.0), density, LOGITS)
+    return even_look(surface_cells(BOX, 8), density, LOGITS)
 
 
 def told_look() -> VisionModel:
     """White where the light is seen, black where it is not."""
-    model = shadow_look(filled_grid(BOX, 8, 1.0), OPAQUE)
+    model = shadow_look(surface_cells(BOX, 8), OPAQUE)
     assert model.weights.size == TOLD
     return model
 

@@ -4,8 +4,8 @@ from harness.authoring.vision.cells import CellTraining
 from harness.authoring.vision.data import HeldOutViews
 from harness.authoring.vision.lessons import OPAQUE, draw_lamps, draw_lessons
 from harness.authoring.vision.profiles import CellsSpec
-from harness.objectfile.vision.network.network import NetworkSize, VisionGrid
-from harness.objectfile.vision.shell import grid_of, lattice_of, surface_shell
+from harness.authoring.vision.surface_cells import surface_cells
+from harness.objectfile.vision.network import PER_CELL, NetworkSize, VisionGrid
 from harness.sim.light.appearance import plain
 from harness.sim.light.direct_image import LitObject
 from tests.oracles.seen_shapes import ball
@@ -24,9 +24,8 @@ def lit_ball() -> LitObject:
 
 def grid_for(lit: LitObject) -> tuple[VisionGrid, float]:
     """Four cells along it, and m of a voxel of its shell."""
-    lattice = lattice_of(lit.appearance.mesh, TINY.cells)
-    shell = surface_shell(lit.appearance.mesh, lattice)
-    return grid_of(shell, lattice), shell.voxel
+    grid = surface_cells(lit.appearance.mesh, TINY.cells)
+    return grid, grid.cell / PER_CELL
 
 
 def training_of(lit: LitObject, spec: CellsSpec = TINY, seed: int = 3, threads: int = 1) -> CellTraining:

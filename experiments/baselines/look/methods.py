@@ -15,15 +15,13 @@ from harness.authoring.vision.vision import networks_alone
 from harness.basics.arrays import AnyArray
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.published.camera import SIZE
-from harness.objectfile.vision.network.graph import vision_graph
-from harness.objectfile.vision.render import VisionRenderer
-from harness.objectfile.vision.settings import RenderSettings
-from harness.objectfile.vision.vision import open_vision
+from harness.objectfile.vision.graph import vision_graph
+from harness.objectfile.vision.render import RenderSettings, VisionRenderer, open_vision
 
 _SEED = 0
 
 _SETTINGS: tuple[tuple[str, Column, RenderSettings], ...] = (
-    ("one sample a ray, at the mesh", "ours, smallest", RenderSettings(level="one_sample")),
+    ("coverage at pixel centres", "ours, smallest", RenderSettings(coverage=1)),
     ("default", "ours", RenderSettings()),
     ("four rays a pixel", "ours, largest", RenderSettings(rays=2)),
 )

@@ -1,4 +1,4 @@
-"""What one step of a tiny network's training is shown, compiled: places, samples of pictures, lamps.
+"""What one step of a tiny network's training is shown, compiled: places and lamps.
 
 Numbers are float32.
 """
@@ -37,28 +37,6 @@ class Lesson(NamedTuple):
     depth: AnyArray
     weight: AnyArray
     lamps: AnyArray
-
-
-class Pixels(NamedTuple):
-    """What one network learns from pictures beside; n samples of their rays, none where it learns from none.
-
-    Attributes:
-        encoded: ``(n, 3 + 6 octaves)``.
-        told: ``(n, directions)`` what the later layer is told.
-        colours: ``(n, 3)`` linear.
-        weight: ``(n,)`` of the colours' errors; of density nothing is learned.
-    """
-
-    encoded: AnyArray
-    told: AnyArray
-    colours: AnyArray
-    weight: AnyArray
-
-
-def no_pixels(place: int, directions: int) -> Pixels:
-    """Of a network that learns from no picture."""
-    encoded, told, colours = (np.empty((0, size), _F) for size in (place, directions, 3))
-    return Pixels(encoded, told, colours, np.empty(0, _F))
 
 
 class Batch(NamedTuple):
@@ -110,10 +88,10 @@ def encode(values: AnyArray, factors: AnyArray, first: int, out: AnyArray) -> No
 
 
 @compiled_fast
-def gather(lesson: Lesson, places: int, state: AnyArray, batch: Batch) -> None:
+def gather(lesson: Lesson, state: AnyArray, batch: Batch) -> None:
     """Draw places, with the light that each has."""
     place, directions = lesson.encoded.shape[1], lesson.told.shape[1]
-    for i in range(places):
+    for i in range(len(batch.at)):
         n = int(_drawn(state) % np.uint64(len(lesson.encoded)))
         batch.at[i] = n
         for j in range(place):
@@ -126,21 +104,10 @@ def gather(lesson: Lesson, places: int, state: AnyArray, batch: Batch) -> None:
 
 
 @compiled_fast
-def look(pixels: Pixels, places: int, state: AnyArray, batch: Batch) -> None:
-    """Draw samples of pictures for the rows that no place of the surface has."""
-    for i in range(places, len(batch.at)):
-        n = int(_drawn(state) % np.uint64(len(pixels.encoded)))
-        batch.at[i] = n
-        batch.encoded[i] = pixels.encoded[n]
-        batch.told[i] = pixels.told[n]
-        batch.wanted[i] = pixels.colours[n]
-
-
-@compiled_fast
-def light(lesson: Lesson, places: int, hidden: float, turns: AnyArray, state: AnyArray, batch: Batch) -> None:
+def light(lesson: Lesson, hidden: float, turns: AnyArray, state: AnyArray, batch: Batch) -> None:
     """Light the batch's places anew: by a lamp on their side, or by a hidden one from anywhere."""
     last = batch.told.shape[1] - _EXTRAS
-    for i in range(places):
+    for i in range(len(batch.at)):
         n, bits = batch.at[i], _drawn(state)
         k = int(bits % np.uint64(len(lesson.lamps)))
         cosine = _NONE
@@ -153,4 +120,4 @@ def light(lesson: Lesson, places: int, hidden: float, turns: AnyArray, state: An
         for c in range(3):
             batch.lamps[i, c] = turned * lesson.lamps[k, c]
             batch.wanted[i, c] = lesson.colours[n, c] * turned * cosine if seen else _NONE
-    encode(batch.lamps[:places], turns, 0, batch.told)
+    encode(batch.lamps, turns, 0, batch.told)

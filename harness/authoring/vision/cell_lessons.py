@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import cKDTree
 
-from harness.authoring.vision.batch import Lesson, Pixels, encode
+from harness.authoring.vision.batch import Lesson, encode
 from harness.authoring.vision.layers import layer_shapes, octave_factors
 from harness.authoring.vision.lessons import Lessons
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
-from harness.objectfile.vision.network.network import NetworkSize, VisionGrid
+from harness.objectfile.vision.network import NetworkSize, VisionGrid
 
 
 class CellLessons:
@@ -43,11 +43,6 @@ class CellLessons:
             *(self._encoded(cell, at), self._told(at), lessons.normals[at], lessons.colours[at]),
             *(lessons.depth[at], lessons.weight[at], self._lamps),
         )
-
-    def pixels(self, cell: int) -> Pixels:
-        """Of samples of pictures' rays."""
-        lessons, at = self._lessons, self._taught(cell)
-        return Pixels(self._encoded(cell, at), self._told(at), lessons.colours[at], lessons.weight[at])
 
     def _encoded(self, cell: int, at: IntArray) -> AnyArray:
         place = local_places(self._grid, cell, self._lessons.points[at])

@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from harness.authoring.checkpoint import TrainingProgress, read_checkpoint, write_checkpoint
-from harness.authoring.vision.batch import Lesson, Pixels, batch_of, no_pixels
+from harness.authoring.vision.batch import batch_of
 from harness.authoring.vision.cell_lessons import CellLessons
 from harness.authoring.vision.kernels import teach
 from harness.authoring.vision.layers import (
@@ -24,7 +24,7 @@ from harness.authoring.vision.profiles import CellsSpec
 from harness.basics.arrays import AnyArray
 from harness.basics.cores import own_cores
 from harness.basics.store import digest
-from harness.objectfile.vision.network.network import VisionGrid, VisionModel
+from harness.objectfile.vision.network import VisionGrid, VisionModel
 
 VERSION = 2
 """Raised with every change of what training computes, so that no old checkpoint is gone on from."""
@@ -121,40 +121,19 @@ class CellTraining:
     def _teach(self, cell: int) -> float:
         spec, flat = self.spec, self.flats[cell]
         flat[:] = self._begin
-        lesson = self.by_cell.lesson(cell)
-        nothing = no_pixels(spec.size.place, layer_shapes(spec.size).told[0])
-        drawn = seed_of(self.seed, 77, cell)
-        return teach_cell(flat, spec, lesson, nothing, spec.batch, spec.steps, spec.rate, drawn)
-
-
-def teach_cell(
-    flat: AnyArray,
-    spec: CellsSpec,
-    lesson: Lesson,
-    pixels: Pixels,
-    places: int,
-    steps: int,
-    rate: float,
-    seed: int,
-) -> float:
-    """Train one network on from the weights that it has; ``vision_kernels.teach`` tells of arguments."""
-    size, slope = spec.size, np.empty_like(flat)
-    batch = batch_of(spec.batch, size.place, layer_shapes(size).told[0], size.width)
-    loss = teach(
-        *(flat, layers_of(flat, size), slope, layers_of(slope, size), lesson, pixels, places, batch),
-        *(np.ones(size.turns, np.float32), steps, rate, spec.hidden, spec.opacity, seed),
-    )
-    return float(loss)
+        size, slope = spec.size, np.empty_like(flat)
+        batch = batch_of(spec.batch, size.place, layer_shapes(size).told[0], size.width)
+        # Below 2^63, so that the compiled kernel takes it as the integer that it is.
+        state = np.random.SeedSequence([self.seed, 77, cell]).generate_state(1, np.uint64)[0]
+        loss = teach(
+            *(flat, layers_of(flat, size), slope, layers_of(slope, size), self.by_cell.lesson(cell), batch),
+            *(np.ones(size.turns, np.float32), spec.steps, spec.rate, spec.hidden, spec.opacity),
+            int(state >> np.uint64(1)),
+        )
+        return float(loss)
 
 
 def by_threads(each: Callable[[int], float], cells: range, threads: int) -> list[float]:
     """What comes of every cell, in their order; the compiled training lets threads run beside each other."""
     with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
         return list(pool.map(each, cells))
-
-
-def seed_of(seed: int, *of: int) -> int:
-    """Of one cell's draws."""
-    # Below 2^63, so that the compiled kernel takes it as the integer that it is.
-    state = np.random.SeedSequence([seed, *of]).generate_state(1, np.uint64)[0]
-    return int(state >> np.uint64(1))

@@ -1,8 +1,7 @@
 """What pictures cost and err: every knob turned from its default, on cameras and lights kept back.
 
 Each way is asked for the same pictures in turns, so that what else the machine does falls on all alike.
-Errors are against exact pictures, and against many samples of the same networks, which tells what the
-renderer leaves out from what the networks do not know.
+Errors are against exact pictures.
 """
 
 import time
@@ -15,16 +14,15 @@ import numpy as np
 from harness.authoring.training import Report
 from harness.authoring.vision.cells import VERSION
 from harness.authoring.vision.data import HeldOutViews
-from harness.authoring.vision.metrics import BEHIND, network_pictures, picture_errors, reference_pictures
+from harness.authoring.vision.metrics import BEHIND, picture_errors, reference_pictures
 from harness.authoring.vision.profiles import CellsSpec
 from harness.authoring.vision.vision import networks_alone
 from harness.basics.arrays import FloatArray
 from harness.basics.store import digest
 from harness.basics.whole_file import write_bytes_whole
 from harness.cost.curve import ErrorUnit, Point, Sample
-from harness.objectfile.vision.network.graph import vision_graph
-from harness.objectfile.vision.render import VisionRenderer
-from harness.objectfile.vision.settings import COVERS, LEVELS, RenderSettings
+from harness.objectfile.vision.graph import vision_graph
+from harness.objectfile.vision.render import COVERS, RenderSettings, VisionRenderer
 from harness.picture.image_metrics import mean_square
 from harness.picture.linear_image import LinearImage
 from harness.sim.light.direct_image import LitObject
@@ -66,15 +64,8 @@ def ways(spec: CellsSpec, side: int) -> tuple[Way, ...]:
     """
     plain = Way(DEFAULT, DEFAULT, spec, side)
     drawn: list[tuple[str, str, RenderSettings]] = [
-        *(("level", level, RenderSettings(level=level)) for level in LEVELS),
-        *(("step, voxels", f"{step:g}", RenderSettings(step=step)) for step in (4.0, 2.0, 1.0, 0.5, 0.25)),
-        *(
-            ("termination", f"{end:g}", RenderSettings(termination=end))
-            for end in (0.3, 0.1, 0.03, 0.01, 0.0)
-        ),
         *(("coverage, sub-pixels", str(of), RenderSettings(coverage=of)) for of in COVERS),
         *(("rays, along a pixel", str(rays), RenderSettings(rays=rays)) for rays in (1, 2, 3)),
-        *(("lead, voxels", f"{lead:g}", RenderSettings(lead=lead)) for lead in (0.5, 1.0, 2.0, np.inf)),
     ]
     made: list[tuple[str, str, CellsSpec]] = [
         *(("grid, cells", str(cells), replace(spec, cells=cells)) for cells in (8, 12, 16, 24)),
@@ -89,15 +80,6 @@ def ways(spec: CellsSpec, side: int) -> tuple[Way, ...]:
     return (plain, *(way for way in turned if replace(way, knob=DEFAULT, level=DEFAULT) != plain))
 
 
-def every_sample(settings: RenderSettings) -> RenderSettings:
-    """Many samples of the whole shell, no ray ended: what skipping, ending and thinning out leave out.
-
-    Pixels are cut up as they were, which is no networks' matter: it tells in the errors against exact
-    pictures.
-    """
-    return RenderSettings(step=0.125, termination=0.0, coverage=settings.coverage, rays=settings.rays)
-
-
 @dataclass(frozen=True, eq=False)
 class Worth:
     """What one way asks of networks, and what its pictures err by.
@@ -109,7 +91,6 @@ class Worth:
         file_bytes: of the file of its networks.
         errors: grey levels from the exact picture of each view, root mean square.
         exact: errors against exact pictures, by ``picture_errors``'s names.
-        many: the same against many samples of the same networks.
     """
 
     samples: float
@@ -118,7 +99,6 @@ class Worth:
     file_bytes: int
     errors: tuple[float, ...]
     exact: Mapping[str, float]
-    many: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +134,6 @@ class Studio:
     renderers: dict[CellsSpec, VisionRenderer] = field(default_factory=dict)
     file_bytes: dict[CellsSpec, int] = field(default_factory=dict)
     _exact: dict[int, list[LinearImage]] = field(default_factory=dict)
-    _many: dict[Way, list[LinearImage]] = field(default_factory=dict)
 
     def train(self, spec: CellsSpec, seed: int, folder: Path, report: Report) -> None:
         """Take networks from the folder where they are there; a training that was killed goes on.
@@ -193,20 +172,16 @@ class Studio:
         if way.side not in self._exact:
             self._exact[way.side] = reference_pictures(self.lit, views, _SAMPLES)
         exact, found = self._exact[way.side], [each.image for each in drawn]
-        whole = replace(way, knob="", level="", settings=every_sample(way.settings))
-        if whole not in self._many:
-            self._many[whole] = network_pictures(renderer, views, whole.settings)
         return Worth(
             samples=float(np.mean([each.samples for each in drawn])),
             rays=float(np.mean([each.rays for each in drawn])),
-            networks=len(renderer.model.grid),
+            networks=len(renderer.networks.grid),
             file_bytes=self.file_bytes[way.networks],
             errors=tuple(
                 mean_square(got.display(BEHIND), wanted.display(BEHIND)) ** 0.5
                 for got, wanted in zip(found, exact, strict=True)
             ),
             exact=picture_errors(exact, found),
-            many=picture_errors(self._many[whole], found),
         )
 
     def _key(self, spec: CellsSpec, seed: int) -> str:

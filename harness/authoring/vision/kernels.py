@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.authoring.vision.batch import Batch, Lesson, Pixels, gather, light, look
+from harness.authoring.vision.batch import Batch, Lesson, gather, light
 from harness.authoring.vision.layers import Layers
 from harness.basics.arrays import AnyArray
 from harness.basics.compiled import compiled_fast
@@ -58,14 +58,12 @@ def _forth(layers: Layers, encoded: AnyArray, told: AnyArray, batch: Batch) -> N
 
 
 @compiled_fast
-def _wrong(
-    layers: Layers, lesson: Lesson, pixels: Pixels, places: int, opacity: float, batch: Batch
-) -> float:
+def _wrong(layers: Layers, lesson: Lesson, opacity: float, batch: Batch) -> float:
     """Put errors in place of what came out; the sum of squares of the colours' is returned."""
     share, loss, of_depth = _ONE / _F(len(batch.at)), 0.0, _F(opacity)
     for i in range(len(batch.at)):
         n = batch.at[i]
-        weight = lesson.weight[n] if i < places else pixels.weight[n]
+        weight = lesson.weight[n]
         for c in range(3):
             colour = _ONE / (_ONE + np.exp(-(batch.logits[i, c] + layers.colour_bias[c])))
             root = np.sqrt(colour + _FAINT)
@@ -73,9 +71,6 @@ def _wrong(
             slope = max(_HALF * colour * (_ONE - colour) / root, _LEAST_SLOPE)
             loss += weight * error * error
             batch.logits[i, c] = weight * share * error * slope
-        if i >= places:
-            batch.raw[i, 0] = _NONE
-            continue
         depth = lesson.depth[n]
         error = batch.raw[i, 0] + layers.density_bias[0] - depth
         # Deeper than opaque and emptier than empty are no errors.
@@ -147,8 +142,6 @@ def teach(
     slope: AnyArray,
     slopes: Layers,
     lesson: Lesson,
-    pixels: Pixels,
-    places: int,
     batch: Batch,
     turns: AnyArray,
     steps: int,
@@ -165,8 +158,6 @@ def teach(
         slope: ``(parameters,)`` float32, room.
         slopes: views into it.
         lesson: what it learns from.
-        pixels: what it learns from beside.
-        places: of each batch that are ``lesson``'s; the others are ``pixels``'.
         batch: room; as many samples a step as it has.
         turns: ``(turns,)`` float32 ones, octaves of directions.
         steps: of Adam.
@@ -183,12 +174,11 @@ def teach(
     mean: Any = 1.0
     square: Any = 1.0
     for step in range(steps):
-        gather(lesson, places, state, batch)
+        gather(lesson, state, batch)
         if len(lesson.lamps):
-            light(lesson, places, hidden, turns, state, batch)
-        look(pixels, places, state, batch)
+            light(lesson, hidden, turns, state, batch)
         _forth(layers, batch.encoded, batch.told, batch)
-        wrong = _wrong(layers, lesson, pixels, places, opacity, batch)
+        wrong = _wrong(layers, lesson, opacity, batch)
         _back(layers, slopes, batch)
         mean, square = mean * _MEAN, square * _SQUARE
         now = 0.5 * rate * (1.0 + np.cos(np.pi * step / steps)) * min(1.0, (step + 1) / _WARM)

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
-from harness.objectfile.vision.network.network import NetworkSize, VisionWeights
-from harness.objectfile.vision.network.plain import scatter_rows
+from harness.objectfile.vision.network import NetworkSize, VisionWeights, scatter_rows
 
 FALL = 2.0
 """An octave of places is so much smaller than the one before, from the second on."""

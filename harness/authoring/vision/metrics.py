@@ -5,8 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from harness.authoring.vision.data import HeldOutViews
-from harness.objectfile.vision.render import VisionRenderer
-from harness.objectfile.vision.settings import RenderSettings
+from harness.objectfile.vision.render import RenderSettings, VisionRenderer
 from harness.picture.image_metrics import psnr, ssim
 from harness.picture.linear_image import LinearImage
 from harness.picture.pinhole import DirectionalLight, Pinhole

@@ -46,7 +46,6 @@ def build_vision(
     out: Path,
     report: Report,
     threads: int | None = None,
-    finish: bool = False,
 ) -> BuiltVision:
     """Build an object's look, or go on with a training that was stopped.
 
@@ -55,15 +54,13 @@ def build_vision(
         out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
         report: told of progress.
         threads: of a training; None for as many as the process has cores.
-        finish: whether they learn from pictures then, in a profile that does not say so itself.
 
     Raises:
         WrongUse: options that cannot be.
         MeshRefused: a mesh that cannot stand for an object.
         DataRefused: a checkpoint or an ObjectFile in the folder that is of something else.
     """
-    named = vision_profile(wanted.profile)
-    chosen = named.finished() if finish else named
+    chosen = vision_profile(wanted.profile)
     begun = time.perf_counter()
     report("reading the mesh and its colours", 0.0)
     source = source_of(wanted.mesh, wanted.licence)

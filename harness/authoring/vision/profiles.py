@@ -4,10 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from harness.authoring.vision.finish_profiles import CellsFinish
 from harness.basics.errors import WrongUse
 from harness.basics.files.named_file import nearest
-from harness.objectfile.vision.network.network import CELLS, PAPER, NetworkSize
+from harness.objectfile.vision.network import CELLS, PAPER, NetworkSize
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,6 @@ class VisionProfile:
         pictures: kept back, by which they are judged.
         side: pixels of those pictures.
         samples: a side of a pixel of the reference.
-        finish: what they learn from pictures then; None for nothing.
         edge: m between vertices of a built-in object, of which pictures are drawn. At that of touch and
             sound, 3 mm, the object's mesh serves and no finer one is written beside it.
     """
@@ -71,7 +69,6 @@ class VisionProfile:
     strict: CellsSpec | None = None
     side: int = 256
     samples: int = 4
-    finish: CellsFinish | None = None
     edge: float = 1.5e-3
 
     def __post_init__(self) -> None:
@@ -84,10 +81,6 @@ class VisionProfile:
                 f"{self.pictures} pictures of {self.side} pixels with {self.samples} samples judge nothing; "
                 "give 1 or more of each"
             )
-
-    def finished(self) -> "VisionProfile":
-        """The same, with what learns from the surface alone finished on pictures."""
-        return replace(self, finish=self.finish or CellsFinish())
 
 
 _COMPACT = NetworkSize(width=32, octaves=6, turns=3, kind="osf-v")
@@ -108,11 +101,10 @@ VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
         CellsSpec(replace(PAPER, kind="osf-v"), places=4_000_000, steps=10_000, batch=128),
         pictures=12,
         strict=CellsSpec(PAPER, places=8_000_000),
-    ).finished(),
+    ),
 })  # fmt: skip
 """None of them needs torch. ``shipped`` takes the fewest bytes, of the files that come with the program.
-``paper`` has networks of ObjectFolder 2.0's size, finished on pictures as those are; its strict ones are
-those, told no more."""
+``paper`` has networks of ObjectFolder 2.0's size; its strict ones are those, told no more."""
 
 
 def vision_profile(name: str) -> VisionProfile:

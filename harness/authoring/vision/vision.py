@@ -2,7 +2,6 @@
 
 Every network is trained on its own: regressed on what leaves places of the surface, without noise and
 without a picture being drawn (``vision_lessons``). Nothing is distilled: the surface itself answers exactly.
-Pictures come last, where the profile has them (``vision_finish``).
 """
 
 from collections.abc import Mapping
@@ -12,16 +11,13 @@ from pathlib import Path
 from harness.authoring.training import Laps, Report, train
 from harness.authoring.vision.cells import CellTraining
 from harness.authoring.vision.data import HeldOutViews, held_out_pictures
-from harness.authoring.vision.finish import CellFinishing
-from harness.authoring.vision.finish_profiles import CellsFinish
 from harness.authoring.vision.lessons import OPAQUE, draw_for
 from harness.authoring.vision.metrics import network_pictures, picture_errors, reference_pictures
 from harness.authoring.vision.profiles import CellsSpec, VisionProfile
-from harness.authoring.vision.seen import Exact, pictures_to_learn
-from harness.objectfile.vision.network.graph import vision_graph
-from harness.objectfile.vision.network.network import VisionModel
+from harness.authoring.vision.surface_cells import surface_cells
+from harness.objectfile.vision.graph import vision_graph
+from harness.objectfile.vision.network import PER_CELL, VisionModel
 from harness.objectfile.vision.render import VisionRenderer
-from harness.objectfile.vision.shell import grid_of, lattice_of, surface_shell
 from harness.picture.linear_image import LinearImage
 from harness.sim.light.appearance import Appearance
 from harness.sim.light.direct_image import LitObject
@@ -34,9 +30,6 @@ STRICT = "strict_"
 
 STRICT_CHECKPOINT = ".vision_strict_training.npz"
 
-UNFINISHED = "unfinished_"
-"""Before the names of errors that networks had before they were finished on pictures."""
-
 Settings = dict[str, str | float | int | bool | None]
 
 
@@ -47,8 +40,7 @@ class AuthoredVision:
     Attributes:
         model: in float16, to be written; for the look's mesh.
         errors: of pictures kept back, by a name with its unit (``vision_metrics.picture_errors``); those of
-            networks told no more than the paper's begin with ``strict_``, then those that networks had before
-            they were finished on pictures with ``unfinished_``.
+            networks told no more than the paper's begin with ``strict_``.
         settings: how they were made.
         seconds: s on the clock of each stage.
     """
@@ -87,31 +79,21 @@ def author_vision(
     references = reference_pictures(lit, held_out, profile.samples)
     clock.lap("references")
     made = _Making(lit, held_out, seed, report, threads, clock)
-    pictures = [] if profile.finish is None else made.pictures(profile.finish)
     errors: dict[str, float] = {}
     # No teacher: every description says so, and the same build goes on writing the same file.
     settings: Settings = {"teaching": "none"}
     models: list[VisionModel] = []
     for spec, name, word in _asked(profile):
         training = made.trained(spec, folder / name, word)
-        if profile.finish is not None:
-            errors |= made.judged(training.finish(), references, f"{word}{UNFINISHED}")
-            made.finish(training, profile.finish, pictures, finished_file(folder / name), word)
         models.append(training.finish())
         errors |= made.judged(models[-1], references, word)
-        settings |= {} if word else _settings(spec, training, profile.finish)
+        settings |= {} if word else _settings(spec, training)
     return AuthoredVision(models[0], errors, settings, clock.seconds)
 
 
 def checkpoints(folder: Path) -> list[Path]:
     """Files that a stopped training goes on from, there or not."""
-    kept = [folder / name for name in (CHECKPOINT, STRICT_CHECKPOINT)]
-    return kept + [finished_file(each) for each in kept]
-
-
-def finished_file(checkpoint: Path) -> Path:
-    """Beside a training's checkpoint: of what it learned from pictures then."""
-    return checkpoint.with_name(f"{checkpoint.stem}-pictures{checkpoint.suffix}")
+    return [folder / name for name in (CHECKPOINT, STRICT_CHECKPOINT)]
 
 
 def _asked(profile: VisionProfile) -> list[tuple[CellsSpec, str, str]]:
@@ -155,11 +137,10 @@ def cells_to_train(
         seed: of all that is drawn.
         threads: None for as many as the process has cores.
     """
-    lattice = lattice_of(lit.appearance.mesh, spec.cells)
-    shell = surface_shell(lit.appearance.mesh, lattice)
-    lessons, lamps = draw_for(spec.size.kind, lit, spec.places, shell.voxel, seed, held_out)
-    grid, scale = grid_of(shell, lattice), OPAQUE / shell.voxel
-    return CellTraining(spec, grid, lessons, lamps, scale, seed, threads)
+    grid = surface_cells(lit.appearance.mesh, spec.cells)
+    voxel = grid.cell / PER_CELL
+    lessons, lamps = draw_for(spec.size.kind, lit, spec.places, voxel, seed, held_out)
+    return CellTraining(spec, grid, lessons, lamps, OPAQUE / voxel, seed, threads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,19 +162,6 @@ class _Making:
         self.clock.lap(f"{word}networks")
         return training
 
-    def pictures(self, finish: CellsFinish) -> list[Exact]:
-        found = pictures_to_learn(*(self.lit, finish, self.seed, self.held_out, self.report, self.threads))
-        self.clock.lap("pictures")
-        return found
-
-    def finish(
-        self, training: CellTraining, finish: CellsFinish, pictures: list[Exact], checkpoint: Path, word: str
-    ) -> None:
-        """The training's networks are changed."""
-        finishing = CellFinishing(training, finish, self.lit.appearance.mesh, pictures)
-        train(finishing, finishing.epochs, checkpoint, self.report)
-        self.clock.lap(f"{word}finish")
-
     def judged(self, model: VisionModel, references: list[LinearImage], word: str) -> dict[str, float]:
         self.report("measuring", 0.0)
         data = vision_graph(model).SerializeToString()
@@ -204,7 +172,6 @@ class _Making:
         return {f"{word}{name}": value for name, value in errors.items()}
 
 
-def _settings(spec: CellsSpec, training: CellTraining, finish: CellsFinish | None) -> Settings:
-    later = {} if finish is None else {f"finish_{key}": value for key, value in asdict(finish).items()}
+def _settings(spec: CellsSpec, training: CellTraining) -> Settings:
     told = {key: value for key, value in asdict(spec).items() if key != "size"}
-    return asdict(spec.size) | told | later | {"last_loss": sum(training.losses) / len(training.losses)}
+    return asdict(spec.size) | told | {"last_loss": sum(training.losses) / len(training.losses)}

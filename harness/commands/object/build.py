@@ -67,10 +67,6 @@ def build(
             metavar="NAME",
         ),
     ] = None,
-    finish: Annotated[
-        bool,
-        typer.Option("--finish", help="Of vision: let it learn from pictures last; paper does anyway."),
-    ] = False,
     json: options.Json = False,
 ) -> int:
     """Build an object's sound, touch or look: networks, and their errors where they never looked.
@@ -84,8 +80,7 @@ def build(
     --edge are of sound alone.
 
     Vision: tiny networks of the file's own colours, as the mesh's texture says them, measured on pictures
-    whose cameras and lights were kept back. A stopped training goes on when it is called again. --finish
-    is for what no place of the surface tells by itself, as shadows to networks that are told no visibility.
+    whose cameras and lights were kept back. A stopped training goes on when it is called again.
 
     Try: touchstone object build builtin:bowl --material ceramic --profile smoke --out my/bowl
     """
@@ -98,8 +93,6 @@ def build(
 
     if only not in ("audio", "touch", "vision"):
         raise WrongUse(f"--only {only} cannot be built; there is audio, touch and vision")
-    if finish and only != "vision":
-        raise WrongUse(f"--finish is of vision, and --only {only} was asked for")
     if sensor is not None and only != "touch":
         raise WrongUse(f"--sensor is of touch, and --only {only} was asked for")
     thick = options.quantity("--wall", wall, LENGTH)
@@ -118,7 +111,7 @@ def build(
             from harness.authoring.vision.object_vision import build_vision
 
             return build_and_print(
-                lambda report: build_vision(wanted, out, report, threads, finish),
+                lambda report: build_vision(wanted, out, report, threads),
                 _vision_json,
                 _print_vision,
                 json,

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from harness.basics.arrays import ByteArray
     from harness.bench.scene_camera import Lamp
     from harness.objectfile.file import ObjectFile
-    from harness.objectfile.vision.settings import VisionLevel
-    from harness.objectfile.vision.vision import ObjectVision
+    from harness.objectfile.vision.render import ObjectVision
     from harness.picture.linear_image import LinearImage
     from harness.picture.pinhole import Pinhole
 
@@ -87,7 +86,6 @@ def compare(
     fit: Annotated[
         str, typer.Option(help="Of each channel: gain-offset, gain, or none.", metavar="WHAT")
     ] = "gain-offset",
-    level: vision_options.Level = "fused",
     threads: vision_options.Threads = None,
     json: options.Json = False,
 ) -> int:
@@ -98,13 +96,12 @@ def compare(
 
     Try: touchstone object compare vision objects/mug --live mug.jpg --camera 0.25 -0.2 0.2 --out sheet.png
     """
-    from harness.objectfile.vision.vision import vision_level
     from harness.picture.exposure_fit import exposure_kind
     from harness.picture.image_file import read_image
     from harness.picture.live_picture import compare_live
 
     options.require_files(("--out", out, ".png"))
-    chosen, kind = vision_level(level), exposure_kind(fit)
+    kind = exposure_kind(fit)
     wanted = _Wanted(live, background, station, scene, seed, camera, look_at, up, field_of_view, light)
     _require_one_camera(wanted)
     begun = time.perf_counter()
@@ -115,10 +112,10 @@ def compare(
     behind = None if background is None else read_image(background)
     seconds["live"] = time.perf_counter() - begun
     begun = time.perf_counter()
-    image = _lit(vision, seen, chosen)
+    image = _lit(vision, seen)
     seconds["render"] = time.perf_counter() - begun
     found = compare_live(seen.live, image, behind, kind)
-    said = Compared(of, vision, seen, chosen, found, seconds)
+    said = Compared(of, vision, seen, found, seconds)
     draw(said, out)
     for sentence in notes(said):
         warn(sentence)
@@ -199,14 +196,12 @@ def _lit_by(
     return ComparedPhoto(live, camera, known or (Lamp(light_for(camera), np.ones(3)),), not known)
 
 
-def _lit(vision: "ObjectVision", seen: ComparedPhoto, level: "VisionLevel") -> "LinearImage":
+def _lit(vision: "ObjectVision", seen: ComparedPhoto) -> "LinearImage":
     """Light of all lamps, each in its colour."""
     import numpy as np
 
-    from harness.objectfile.vision.settings import RenderSettings
     from harness.picture.linear_image import LinearImage
 
-    settings = RenderSettings(level=level)
-    pictures = [vision.picture(seen.camera, lamp.light, settings).image for lamp in seen.lamps]
+    pictures = [vision.picture(seen.camera, lamp.light).image for lamp in seen.lamps]
     parts = [image.colour * lamp.colour for image, lamp in zip(pictures, seen.lamps, strict=True)]
     return LinearImage(np.sum(parts, axis=0), pictures[0].alpha, pictures[0].depth)

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from harness.basics.arrays import ByteArray
     from harness.bench.scene_camera import Lamp
     from harness.objectfile.file import ObjectFile
-    from harness.objectfile.vision.settings import VisionLevel
-    from harness.objectfile.vision.vision import ObjectVision
+    from harness.objectfile.vision.render import ObjectVision
     from harness.picture.live_picture import Apart, LiveComparison
     from harness.picture.pinhole import Pinhole
 
@@ -50,7 +49,6 @@ class Compared:
         of: the object.
         vision: its look.
         seen: by the camera.
-        level: the simulation's.
         found: how both differ.
         seconds: s on the clock by stage, before the comparison; ``draw`` adds its own.
     """
@@ -58,7 +56,6 @@ class Compared:
     of: "ObjectFile"
     vision: "ObjectVision"
     seen: ComparedPhoto
-    level: "VisionLevel"
     found: "LiveComparison"
     seconds: dict[str, float]
 
@@ -100,7 +97,7 @@ def as_json(compared: Compared, files: Mapping[str, Path | None]) -> dict[str, A
         "schema": 1,
         "folder": str(compared.of.folder),
         "object": compared.of.description.name,
-        "level": compared.level,
+        "level": "one_sample",
         "networks": compared.vision.entry.level,
         **{name: None if path is None else str(path) for name, path in files.items()},
         "rows": rows,
@@ -152,7 +149,7 @@ def print_answer(compared: Compared, files: Mapping[str, Path | None]) -> None:
     x, y, z = (f"{each * 1e3:.4g}" for each in camera.eye)
     ANSWERS.print(
         f"{compared.of.description.name} from ({x}, {y}, {z}) mm, {camera.width} x {camera.height} pixels; "
-        f"{compared.level}, {compared.vision.entry.level}",
+        f"{compared.vision.entry.level}",
         markup=False,
     )
     ANSWERS.print(f"over the object: {_in_words(found.fitted)}; before the fit: {_in_words(found.unfitted)}")
@@ -181,6 +178,6 @@ def _words(compared: Compared) -> tuple[str, str, str]:
     offsets = ", ".join(f"{o:+.3f}±{e:.3f}" for o, e in zip(fit.offset, fit.offset_error, strict=True))
     return (
         f"object found by {found.masked_by} (orange), simulated (blue)\noverlap {found.overlap:.1%}",
-        f"{compared.level}; red, green, blue:\ngain {gains}\noffset {offsets}",
+        f"red, green, blue:\ngain {gains}\noffset {offsets}",
         f"over the object: {_in_words(found.fitted)}\nbefore the fit: {_in_words(found.unfitted)}",
     )

@@ -35,7 +35,7 @@ def vision(
     profile: Annotated[str, typer.Option(help="Of the networks: smoke or standard.")] = "smoke",
     knob: Annotated[
         list[str] | None,
-        typer.Option(help="Only this knob, as termination; may be given again.", metavar="KNOB"),
+        typer.Option(help="Only this knob, as coverage; may be given again.", metavar="KNOB"),
     ] = None,
     views: Annotated[int, typer.Option(help="Pictures, from around.", min=1, max=100)] = 4,
     repeat: Annotated[int, typer.Option(help="Times each is drawn for its seconds.", min=1, max=1000)] = 5,
@@ -51,8 +51,7 @@ def vision(
 
     Knobs of the renderer ask the same networks in other ways; grid, width and what networks are told are
     trained anew, one after the other. Errors are PSNR and SSIM on cameras and lights that nothing was
-    learned from, against exact pictures and against many samples of the same networks. Leave the machine
-    alone meanwhile: its load is noted.
+    learned from, against exact pictures. Leave the machine alone meanwhile: its load is noted.
 
     Try: touchstone cost vision builtin:wrench --threads 1
     """
@@ -112,10 +111,13 @@ def _chosen(spec: "CellsSpec", size: int, knobs: list[str] | None) -> "tuple[Way
     from harness.authoring.vision.cost import DEFAULT, ways
     from harness.basics.errors import WrongUse
     from harness.basics.files.named_file import nearest
+    from harness.objectfile.vision.render import REMOVED
 
     every = ways(spec, size)
     known = [way.knob.partition(",")[0] for way in every]
     for name in knobs or []:
+        if name in REMOVED:
+            raise WrongUse(f"--knob {name}: {REMOVED[name]}; there are {', '.join(dict.fromkeys(known))}")
         if name not in known:
             raise WrongUse(f"no knob {name!r}; {nearest(name, known)}")
     kept = {DEFAULT, *(knobs or known)}
@@ -151,7 +153,6 @@ def _point(cost: "PictureCost", on_front: bool) -> dict[str, Any]:
         "networks": worth.networks,
         "file_bytes": worth.file_bytes,
         "from_exact": _finite(worth.exact),
-        "from_many_samples": _finite(worth.many),
     }
 
 
@@ -164,9 +165,7 @@ def _print(costs: "Sequence[PictureCost]", best: "Sequence[Point]") -> None:
     drawn = Table()
     for heading in ("knob", "level"):
         drawn.add_column(heading, no_wrap=True)
-    for heading in (
-        *("front", "samples", "exact, dB", "SSIM", "object, dB", "many, dB", "CPU, ms", "clock, ms", "MB"),
-    ):
+    for heading in (*("front", "samples", "exact, dB", "SSIM", "object, dB", "CPU, ms", "clock, ms", "MB"),):
         drawn.add_column(heading, justify="right", no_wrap=True)
     last = ""
     for cost in costs:
@@ -176,7 +175,7 @@ def _print(costs: "Sequence[PictureCost]", best: "Sequence[Point]") -> None:
         drawn.add_row(
             *("" if way.knob == last else way.knob, way.level, "*" if cost.point in best else ""),
             *(f"{worth.samples:.0f}", f"{exact['psnr_db']:.2f}", f"{exact['ssim']:.4f}"),
-            *(f"{exact['psnr_db_object']:.2f}", f"{worth.many['psnr_db']:.2f}"),
+            f"{exact['psnr_db_object']:.2f}",
             *(f"{1e3 * cost.point.seconds.value:.1f}", f"{1e3 * cost.point.wall_seconds.mean():.1f}"),
             f"{worth.file_bytes / 1e6:.2f}",
         )

@@ -22,8 +22,7 @@ from harness.commands.output import emit
 
 if TYPE_CHECKING:
     from harness.objectfile.file import ObjectFile
-    from harness.objectfile.vision.settings import RenderSettings
-    from harness.objectfile.vision.vision import ObjectVision
+    from harness.objectfile.vision.render import ObjectVision, RenderSettings
 
 _MOST_SHEET = 2**24
 """Pixels of all pictures of a turntable."""
@@ -41,7 +40,6 @@ def render(
     field_of_view: Annotated[str, typer.Option(help="Across the picture's width.", metavar="A")] = "40deg",
     light: vision_options.Light = None,
     size: Annotated[str, typer.Option(help="Pixels: a side, or columns x rows.", metavar="WxH")] = "256",
-    level: vision_options.Level = "fused",
     rays: Annotated[
         int,
         typer.Option(
@@ -58,9 +56,6 @@ def render(
     alpha_out: Annotated[
         Path | None, typer.Option(help="Share of each pixel that is covered.", metavar="FILE.npy")
     ] = None,
-    compare: Annotated[
-        bool, typer.Option("--compare", help="Say how far it is from all samples of the same networks.")
-    ] = False,
     threads: vision_options.Threads = None,
     json: options.Json = False,
 ) -> int:
@@ -72,19 +67,18 @@ def render(
     Try: touchstone object render vision objects/mug --camera 0.25 -0.2 0.2 --light 1 -1 1 --out mug.png
     """
     from harness.basics.quantities import ANGLE
-    from harness.objectfile.vision.settings import RenderSettings
-    from harness.objectfile.vision.vision import vision_level
+    from harness.objectfile.vision.render import RenderSettings
     from harness.picture.image_file import write_png
 
     options.require_files(
         ("--out", out, ".png"), ("--depth-out", depth_out, ".npy"), ("--alpha-out", alpha_out, ".npy")
     )
     angle = options.quantity("--field-of-view", field_of_view, ANGLE)
-    chosen, pixels = RenderSettings(level=vision_level(level), rays=rays), _pixels(size, turntable)
+    chosen, pixels = RenderSettings(rays=rays), _pixels(size, turntable)
     begun = time.perf_counter()
     of, vision = vision_options.opened(folder, threads)
     views = _views(vision, pixels, camera, look_at, up, light, angle, turntable)
-    found = _rendered(of, vision, views, chosen, compare, begun)
+    found = _rendered(of, vision, views, chosen, begun)
     write_png(out, sheet(found))
     if depth_out is not None:
         write_arrays(depth_out, [picture.image.depth for picture in found.pictures])
@@ -146,11 +140,8 @@ def _rendered(
     vision: "ObjectVision",
     views: tuple[View, ...],
     settings: "RenderSettings",
-    compare: bool,
     begun: float,
 ) -> RenderedLook:
-    from dataclasses import replace
-
     # The first picture, a small one, loads the compiled loops for all that follow.
     camera, light = views[0]
     width = min(camera.width, _FIRST)
@@ -159,10 +150,4 @@ def _rendered(
     loaded, begun = time.perf_counter() - begun, time.perf_counter()
     pictures = tuple(vision.picture(*view, settings) for view in views)
     seconds = {"load": loaded, "render": time.perf_counter() - begun}
-    if not compare:
-        return RenderedLook(of, vision, views, pictures, None, seconds)
-    begun = time.perf_counter()
-    every = replace(settings, level="fused", step=0.25, termination=0.0, lead=float("inf"))
-    finest = tuple(vision.picture(*view, every) for view in views)
-    seconds["compare"] = time.perf_counter() - begun
-    return RenderedLook(of, vision, views, pictures, finest, seconds)
+    return RenderedLook(of, vision, views, pictures, seconds)

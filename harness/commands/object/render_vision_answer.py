@@ -11,8 +11,7 @@ from harness.commands.output import ANSWERS
 if TYPE_CHECKING:
     from harness.basics.arrays import ByteArray, FloatArray
     from harness.objectfile.file import ObjectFile
-    from harness.objectfile.vision.settings import Rendered
-    from harness.objectfile.vision.vision import ObjectVision
+    from harness.objectfile.vision.render import ObjectVision, Rendered
     from harness.picture.pinhole import DirectionalLight, Pinhole
 
 View = tuple["Pinhole", "DirectionalLight"]
@@ -29,7 +28,6 @@ class RenderedLook:
         vision: its look.
         views: a camera and a light for each picture.
         pictures: of the views.
-        finest: the same by every sample of the same networks; None where nobody asked.
         seconds: s on the clock by stage.
     """
 
@@ -37,7 +35,6 @@ class RenderedLook:
     vision: "ObjectVision"
     views: tuple[View, ...]
     pictures: "tuple[Rendered, ...]"
-    finest: "tuple[Rendered, ...] | None"
     seconds: dict[str, float]
 
 
@@ -69,31 +66,6 @@ def write_arrays(path: Path, arrays: "Sequence[FloatArray]") -> None:
     write_array(path, (arrays[0] if len(arrays) == 1 else np.stack(arrays)).astype(np.float32))
 
 
-def from_finest(found: RenderedLook) -> dict[str, float | None] | None:
-    """How far the pictures are from those of every sample; None where nobody asked.
-
-    Root mean square and greatest difference, of linear light and as grey levels before white; in dB, where
-    equal pictures have none.
-    """
-    import numpy as np
-
-    from harness.picture.image_metrics import mean_square, psnr
-
-    if found.finest is None:
-        return None
-    pairs = list(zip(found.pictures, found.finest, strict=True))
-    apart = np.stack([one.image.over(1.0) - other.image.over(1.0) for one, other in pairs])
-    shown, wanted = (np.concatenate([pair[k].image.display() for pair in pairs]) for k in (0, 1))
-    decibels = psnr(shown, wanted)
-    return {
-        "rms_linear": float(np.sqrt((apart**2).mean())),
-        "most_linear": float(np.abs(apart).max()),
-        "image_rms_grey": math.sqrt(mean_square(shown, wanted)),
-        "image_psnr_db": decibels if math.isfinite(decibels) else None,
-        "samples": float(sum(other.samples for _, other in pairs)),
-    }
-
-
 def as_json(found: RenderedLook, out: Path, depth_out: Path | None, alpha_out: Path | None) -> dict[str, Any]:
     """As scripts read it."""
     camera, light = found.views[0]
@@ -102,7 +74,7 @@ def as_json(found: RenderedLook, out: Path, depth_out: Path | None, alpha_out: P
         "schema": 1,
         "folder": str(found.of.folder),
         "object": found.of.description.name,
-        "level": found.pictures[0].level,
+        "level": "one_sample",
         "networks": entry.level,
         "image": str(out),
         "depth_out": None if depth_out is None else str(depth_out),
@@ -115,10 +87,7 @@ def as_json(found: RenderedLook, out: Path, depth_out: Path | None, alpha_out: P
         "rays": sum(picture.rays for picture in found.pictures),
         "covered_share": float(found.pictures[0].image.alpha.mean()),
         "turntable": _turntable(found),
-        "error_estimate": {
-            "from_every_sample": from_finest(found),
-            "networks_measured": dict(entry.network.measured),
-        },
+        "error_estimate": {"networks_measured": dict(entry.network.measured)},
         "seconds": found.seconds,
         "seconds_by_part": dict(found.pictures[0].seconds),
     }
@@ -159,19 +128,11 @@ def print_answer(found: RenderedLook, out: Path, depth_out: Path | None, alpha_o
     many = "" if count == 1 else f", {count} of them a turn"
     ANSWERS.print(
         f"{found.of.description.name} from ({x}, {y}, {z}) mm, light towards ({a}, {b}, {c}), "
-        f"{camera.width} x {camera.height} pixels{many}; {first.level}, {entry.level}",
+        f"{camera.width} x {camera.height} pixels{many}; {entry.level}",
         markup=False,
     )
     samples, rays = (sum(getattr(p, name) for p in found.pictures) for name in ("samples", "rays"))
     ANSWERS.print(f"{samples} samples of {rays} rays; the object covers {first.image.alpha.mean():.1%}")
-    apart = from_finest(found)
-    if apart is not None:
-        decibels = apart["image_psnr_db"]
-        picture = "the same picture" if decibels is None else f"{decibels:.1f} dB"
-        ANSWERS.print(
-            f"from all {apart['samples']:.0f} samples of the same networks: "
-            f"{apart['image_rms_grey']:.3g} grey levels rms, {picture}"
-        )
     for path in (out, depth_out, alpha_out):
         if path is not None:
             ANSWERS.print(str(path), markup=False)

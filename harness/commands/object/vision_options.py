@@ -7,7 +7,7 @@ import typer
 
 if TYPE_CHECKING:
     from harness.objectfile.file import ObjectFile
-    from harness.objectfile.vision.vision import ObjectVision
+    from harness.objectfile.vision.render import ObjectVision
 
 Three = tuple[float, float, float]
 
@@ -35,12 +35,6 @@ Light = Annotated[
         "--light", help="Towards the lamp, object's frame; else over the left shoulder.", metavar="X Y Z"
     ),
 ]
-Level = Annotated[
-    str,
-    typer.Option(
-        "--level", help="fused (a kernel), onnx (the graph alone), or one_sample a pixel, at the mesh."
-    ),
-]
 Threads = Annotated[
     int | None,
     typer.Option("--threads", help="That share the work; as many as cores if left out.", min=1),
@@ -54,7 +48,7 @@ def opened(folder: Path, threads: int | None) -> "tuple[ObjectFile, ObjectVision
         DataRefused: it has none, or is damaged.
     """
     from harness.objectfile.file import ObjectFile
-    from harness.objectfile.vision.vision import open_vision
+    from harness.objectfile.vision.render import open_vision
 
     of = ObjectFile.open(folder)
     return of, open_vision(of, threads)

@@ -15,7 +15,7 @@ from harness.objectfile.published.folder import PublishedObject
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.verify.network import look_at_domain, look_at_graph, look_at_self_test, opened_once
 from harness.objectfile.verify.touch import look_at_codes
-from harness.objectfile.verify.vision import look_at_looks, look_at_networks, look_at_weights
+from harness.objectfile.verify.vision import look_at_looks, look_at_networks
 from harness.objects.builtin import DESCRIPTION
 
 _SAMPLES = 256
@@ -73,8 +73,7 @@ def _looks(of: ObjectFile) -> Iterator[tuple[str, Callable[[], str]]]:
     vision = of.description.vision
     if vision is not None:
         yield "vision: networks", partial(look_at_networks, of, vision)
-        yield "vision: graph and weights", partial(look_at_weights, of, vision)
-        yield "vision: networks and surface", partial(look_at_looks, of)
+        yield "vision: networks and surface", partial(look_at_looks, of, vision)
 
 
 def _of_files(of: ObjectFile | PublishedObject) -> Iterator[tuple[str, Callable[[], str]]]:

@@ -12,10 +12,8 @@ from harness.objectfile.entries import NetworkEntry, Provenance
 from harness.objectfile.file import ObjectFile, file_entry, with_part
 from harness.objectfile.network_part import NetworkPart, network_entry
 from harness.objectfile.surface_file import ply_bytes
-from harness.objectfile.vision.network.graph import FILE, vision_graph
-from harness.objectfile.vision.network.network import BLOCK, VisionModel
-from harness.objectfile.vision.network.tensors import vision_tensors
-from harness.objectfile.vision.shell import DEEP, PER_CELL, shell_for
+from harness.objectfile.vision.graph import FILE, vision_graph, vision_tensors
+from harness.objectfile.vision.network import BLOCK, DEEP, PER_CELL, VisionModel
 from harness.objectfile.vision_entry import VisionEntry
 
 SURFACE = "vision_surface.ply"
@@ -34,8 +32,6 @@ class VisionPart:
         provenance: of the look.
         measured: its errors, by a name with its unit.
         surface: in metres, what pictures are drawn along; None where that is the object's mesh.
-        per_cell: voxels of the shell along a cell.
-        deep: voxels that the shell goes on behind the surface.
         block: samples of one network that the graph is asked together.
     """
 
@@ -43,8 +39,6 @@ class VisionPart:
     provenance: Provenance
     measured: Mapping[str, float] = field(default_factory=dict)
     surface: Mesh | None = None
-    per_cell: int = PER_CELL
-    deep: float = DEEP
     block: int = BLOCK
 
 
@@ -52,11 +46,11 @@ def with_vision(of: ObjectFile, part: VisionPart) -> ObjectFile:
     """The ObjectFile with this look written into it.
 
     Raises:
-        WrongUse: weights that float16 cannot hold, or a block, cells or voxels that cannot be.
+        WrongUse: weights that float16 cannot hold, or a block that cannot be.
         DataRefused: networks of another object than the surface, or a graph that must not be run.
     """
     model, grid, size = part.model, part.model.grid, part.model.weights.size
-    shell_for(of.mesh if part.surface is None else part.surface, grid, part.per_cell, part.deep)
+    grid.require_surface(of.mesh if part.surface is None else part.surface)
     contents: dict[str, bytes] = {}
     network = _network(part, contents)
     surface = None
@@ -74,7 +68,7 @@ def with_vision(of: ObjectFile, part: VisionPart) -> ObjectFile:
             "networks": len(grid),
         },
         "size": {"width": size.width, "octaves": size.octaves, "turns": size.turns, "block": part.block},
-        "shell": {"voxels_per_cell": part.per_cell, "deep_voxels": part.deep},
+        "shell": {"voxels_per_cell": PER_CELL, "deep_voxels": DEEP},
         "network": network,
         "surface": surface,
         "provenance": part.provenance,
@@ -85,7 +79,7 @@ def with_vision(of: ObjectFile, part: VisionPart) -> ObjectFile:
 
 def _network(part: VisionPart, contents: dict[str, bytes]) -> NetworkEntry:
     graph = vision_graph(part.model, part.block)
-    inputs, outputs = vision_tensors(part.model, part.block)
+    inputs, outputs = vision_tensors(part.model.grid, part.model.weights.size, part.block)
     asked = blocks_inside(part.model, _SELF_TEST_BLOCKS, part.block, np.random.default_rng(0))
     return network_entry(
         NetworkPart(FILE, graph, inputs, outputs, asked, _TOLERANCE, part.measured), contents

@@ -1,154 +1,243 @@
-"""Pictures of an object from its networks: rays, a shell, samples by cell, light along rays.
-
-Levels of one effect: ``fused`` asks a kernel made for it; ``onnx`` the file's graph alone, which gives the
-same picture; ``one_sample`` asks once a ray, where the mesh is, and takes what is there as opaque.
-"""
+"""Pictures of an object by its networks: one sample a ray, where it meets the surface, and opaque there."""
 
 import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from harness.basics.arrays import FloatArray
+from harness.basics.cores import own_cores
+from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.mesh import Mesh
-from harness.objectfile.runtime import Network
-from harness.objectfile.vision.coverage.blocks import aim, lay_out
-from harness.objectfile.vision.coverage.contour import Contours
-from harness.objectfile.vision.coverage.outline import Outline, is_closed, mesh_outline, whole_picture
-from harness.objectfile.vision.network.fold import folded
-from harness.objectfile.vision.network.graph import FILE, graph_block, vision_model
-from harness.objectfile.vision.network.tensors import vision_tensors
-from harness.objectfile.vision.passes import Aim, Follower, PassTimes, Rays, Volume
-from harness.objectfile.vision.samples import Asker, FusedAsker, GraphAsker, Scene
-from harness.objectfile.vision.settings import Rendered, RenderSettings, VisionLevel
-from harness.objectfile.vision.shell import DEEP, PER_CELL, shell_for
-from harness.objectfile.vision.surface import SurfaceExtras
-from harness.objectfile.vision.threads import Crew, Workspace
+from harness.objectfile.file import ObjectFile
+from harness.objectfile.self_test import require_self_test
+from harness.objectfile.surface_file import mesh_from_ply
+from harness.objectfile.vision.coverage import Contours, Outline, mesh_outline
+from harness.objectfile.vision.graph import FILE, Answers, VisionNetworks
+from harness.objectfile.vision.hit import HitSurface, SurfacePoints
+from harness.objectfile.vision.view import require_outside, require_size
+from harness.objectfile.vision_entry import VisionEntry
 from harness.picture.linear_image import LinearImage, binned
 from harness.picture.pinhole import DirectionalLight, Pinhole
 
+COVERS = (1, 3, 5, 7)
+"""Sub-pixels along a pixel: odd, so that one is its centre."""
+
+MOST_RAYS = 8
+"""Along a pixel."""
+
+REMOVED = {
+    "level": "there is one way to a picture: one sample a ray, by the ObjectFile's graph",
+    "step": "a ray has one sample, where it meets the surface; rays cuts pixels finer",
+    "termination": "a ray ends where it meets the surface",
+    "lead": "a ray begins where it meets the surface",
+}
+"""Knobs that pictures had, and what stands in their place."""
+
+
+@dataclass(frozen=True)
+class RenderSettings:
+    """Knobs of a picture, each of cost against error.
+
+    Attributes:
+        coverage: sub-pixels along a pixel, of the mesh's outline.
+        rays: along a pixel, so that 2 are four of them. With one, the edge of a print or of a shadow within a
+            pixel is on this side or on that.
+    """
+
+    coverage: int = 3
+    rays: int = 1
+
+    def __post_init__(self) -> None:
+        if self.coverage not in COVERS:
+            raise WrongUse(f"a coverage of {self.coverage}; coverages are {', '.join(map(str, COVERS))}")
+        if not 1 <= self.rays <= MOST_RAYS:
+            raise WrongUse(f"{self.rays} rays along a pixel; 1 to {MOST_RAYS}, so that 2 are four of them")
+
+
+@dataclass(frozen=True, eq=False)
+class Rendered:
+    """A picture and what it took.
+
+    Attributes:
+        image: linear light, coverage and depth.
+        samples: that networks were asked for.
+        rays: of the pixels that show the object.
+        seconds: s of each part, and ``render`` of all.
+    """
+
+    image: LinearImage
+    samples: int
+    rays: int
+    seconds: Mapping[str, float]
+
 
 class VisionRenderer:
-    """An object, ready to be looked at; one picture at a time.
+    """An object, ready to be rendered; one picture at a time.
 
     Args:
         data: of ``vision.onnx``.
         mesh: of the object, in metres.
-        threads: None for as many as the process has cores.
-        per_cell: voxels of the shell along a cell.
-        deep: voxels that it goes on behind the surface.
+        threads: of the networks; None for as many as the process has cores.
         name: of the file, for messages.
 
     Raises:
         DataRefused: the file is not one of networks of vision, or of another object than the mesh.
     """
 
-    def __init__(
-        self,
-        data: bytes,
-        mesh: Mesh,
-        threads: int | None = None,
-        per_cell: int = PER_CELL,
-        deep: float = DEEP,
-        name: str = FILE,
-    ) -> None:
-        self._data, self._mesh, self._name = data, mesh, name
-        self.model = vision_model(data, name)
-        self.shell = shell_for(mesh, self.model.grid, per_cell, deep)
-        self._closed, self._contours = is_closed(mesh), Contours.of(mesh)
-        self._crew, self._room = Crew(threads), Workspace()
-        self._follower = Follower(Volume(self.model, self.shell, per_cell), self._crew)
-        extras = self.model.weights.size.extras
-        self._extras = SurfaceExtras(mesh, extras, self._closed)
-        self._askers: dict[str, Asker] = {}
+    def __init__(self, data: bytes, mesh: Mesh, threads: int | None = None, name: str = FILE) -> None:
+        self.networks = VisionNetworks(data, name, own_cores() if threads is None else threads)
+        self.networks.grid.require_surface(mesh)
+        self._contours = Contours.of(mesh)
+        self._surface = HitSurface(self._contours)
 
     def render(
         self, camera: Pinhole, light: DirectionalLight, settings: RenderSettings | None = None
     ) -> Rendered:
-        """A picture of the object under one light.
+        """Render the object under one light.
 
         Args:
             camera: that looks; anywhere, within the object too.
             light: from far away.
             settings: None for the default.
         """
-        chosen, begun = settings or RenderSettings(), time.perf_counter()
-        if chosen.rays == 1:
-            return self._one_ray(camera, light, chosen)
+        chosen, times = settings or RenderSettings(), [time.perf_counter()]
         fine = camera.resized(chosen.rays * camera.width, chosen.rays * camera.height)
-        found = self._one_ray(fine, light, chosen)
-        image = binned(found.image, chosen.rays)
-        seconds = {**found.seconds, "render": time.perf_counter() - begun}
-        return Rendered(image, found.level, found.samples, found.rays, seconds)
+        outline = mesh_outline(self._contours, fine, chosen.coverage)
+        times.append(time.perf_counter())
+        asked = self._surface.points(fine, light, outline)
+        times.append(time.perf_counter())
+        found = self._ask(asked)
+        times.append(time.perf_counter())
+        image = _picture(fine, outline, found, light)
+        image = binned(image, chosen.rays) if chosen.rays > 1 else image
+        times.append(time.perf_counter())
+        seconds = dict(zip(("outline", "hits", "networks", "picture"), np.diff(times).tolist(), strict=True))
+        samples = int(np.count_nonzero(found.known))
+        return Rendered(image, samples, len(found.known), seconds | {"render": times[-1] - times[0]})
 
-    def _one_ray(self, camera: Pinhole, light: DirectionalLight, chosen: RenderSettings) -> Rendered:
-        """A picture of one ray a pixel."""
-        watch = PassTimes()
-        asker = self._asker(chosen.level)
-        watch.lap("open")
-        outline = self._outline(camera, chosen)
-        watch.lap("outline")
-        rays, slant, aimed = self._rays(camera, light, outline, chosen)
-        watch.lap("rays")
-        samples = self._follower.follow(rays, aimed, asker, chosen, watch)
-        image = _picture(camera, outline, rays.sums, slant, light.irradiance / np.pi)
-        watch.lap("picture")
-        watch.seconds["render"] = time.perf_counter() - watch.begun
-        return Rendered(image, chosen.level, samples, len(slant), watch.seconds)
+    def opacities(self, camera: Pinhole, light: DirectionalLight, depth: float) -> FloatArray:
+        """Compute which share of the light the networks stop within a depth, at each point that is seen.
 
-    def _outline(self, camera: Pinhole, chosen: RenderSettings) -> Outline:
-        if chosen.coverage == 1 and chosen.marches:
-            return whole_picture(camera)
-        told = self.model.weights.size.extras > 0
-        side = chosen.coverage
-        ready = self._contours
-        return mesh_outline(self._mesh, self._closed, camera, side, self._crew, self._room, told, ready)
+        Args:
+            camera: that looks.
+            light: from far away.
+            depth: m behind the surface, over which the density there is taken to last.
+        """
+        outline = mesh_outline(self._contours, camera, 1)
+        found = self._ask(self._surface.points(camera, light, outline))
+        return np.where(found.known, -np.expm1(-depth * found.density.astype(np.float64)), 0.0)
 
-    def _rays(
-        self, camera: Pinhole, light: DirectionalLight, outline: Outline, chosen: RenderSettings
-    ) -> tuple[Rays, FloatArray, Aim]:
-        """The rays, depth for a unit of length along each, and what fills in both for some of them."""
-        count, (x, y) = len(outline.pixels), camera.centre_px
-        ways, surface = self._room.take("ways", (count, 3), np.float64), np.full(count, np.inf)
-        slant, begin = np.empty(count), np.zeros(count)
-        views = self._room.take("views", (count, 3), np.float32)
-        extras = self._room.take("extras", (count, self._extras.count), np.float32)
-        lit = self._extras.under(camera.eye, light.direction)
-        rotation = np.ascontiguousarray(camera.object_from_camera[:3, :3])
-
-        def aimed(first: int, last: int, room: Workspace) -> None:
-            at = slice(first, last)
-            places, drawn = outline.places[at], (ways[at], views[at], slant[at])
-            aim(places, camera.focal_px, x, y, rotation, *drawn)
-            if len(outline.depth):
-                surface[at] = outline.depth[at] / slant[at]
-                if np.isfinite(chosen.lead):
-                    begin[at] = np.maximum(surface[at] - chosen.lead * self.shell.voxel, 0.0)
-            if lit is not None:
-                lit.surface_inputs(ways[at], surface[at], outline.faces[at], extras[at], room)
-
-        rays = Rays.begun(camera.eye, ways, surface, Scene(views, extras, light.direction), begin)
-        return rays, slant, aimed
-
-    def _asker(self, level: VisionLevel) -> Asker:
-        """The way to ask that a level has, made when it is first used."""
-        kind = "onnx" if level == "onnx" else "fused"
-        if kind not in self._askers:
-            self._askers[kind] = self._opened() if kind == "onnx" else FusedAsker(folded(self.model.weights))
-        return self._askers[kind]
-
-    def _opened(self) -> GraphAsker:
-        block = graph_block(self._data, self._name)
-        network = Network(self._data, self._name, *vision_tensors(self.model, block))
-        return GraphAsker(network, self.model.grid, self.model.weights.density_scale, block)
+    def _ask(self, asked: SurfacePoints) -> Answers:
+        return self.networks.ask(asked.points, asked.views, asked.light, asked.extras)
 
 
-def _picture(
-    camera: Pinhole, outline: Outline, sums: FloatArray, slant: FloatArray, radiance: float
-) -> LinearImage:
-    rows, columns = camera.height, camera.width
-    colour, alpha = np.zeros((rows * columns, 3)), np.zeros(rows * columns)
-    depth = np.full(rows * columns, np.inf)
-    lay_out(outline.pixels, outline.cover, sums, slant, radiance, colour, alpha, depth)
-    return LinearImage(
-        colour.reshape(rows, columns, 3), alpha.reshape(rows, columns), depth.reshape(rows, columns)
+def _picture(camera: Pinhole, outline: Outline, found: Answers, light: DirectionalLight) -> LinearImage:
+    """Lay out what the networks answered in the pixels that it belongs to."""
+    shape, known = (camera.height, camera.width), found.known
+    pixels, cover = outline.pixels[known], outline.cover[known].astype(np.float64)
+    colour, alpha, depth = (
+        np.zeros((camera.pixels, 3)),
+        np.zeros(camera.pixels),
+        np.full(camera.pixels, np.inf),
     )
+    colour[pixels] = found.scattered[known] * (light.irradiance / np.pi * cover)[:, None]
+    alpha[pixels], depth[pixels] = cover, outline.depth[known]
+    return LinearImage(colour.reshape(*shape, 3), alpha.reshape(shape), depth.reshape(shape))
+
+
+class ObjectVision:
+    """The look of one object; one picture at a time.
+
+    Attributes:
+        entry: its table in ``object.json``.
+        surface: in metres, along which pictures are rendered.
+        renderer: of the networks.
+    """
+
+    def __init__(self, entry: VisionEntry, surface: Mesh, renderer: VisionRenderer) -> None:
+        self.entry, self.surface, self.renderer = entry, surface, renderer
+
+    def picture(
+        self, camera: Pinhole, light: DirectionalLight, settings: RenderSettings | None = None
+    ) -> Rendered:
+        """Render the object under one light.
+
+        Args:
+            camera: outside of the object.
+            light: from far away.
+            settings: None for the default.
+
+        Raises:
+            OutOfDomain: a camera within the object, or a picture larger than is drawn, all its rays counted.
+        """
+        require_size(camera.width, camera.height, 1 if settings is None else settings.rays)
+        require_outside(self.surface, camera.eye)
+        return self.renderer.render(camera, light, settings)
+
+    def lit(
+        self, camera: Pinhole, lights: Sequence[DirectionalLight], settings: RenderSettings | None = None
+    ) -> Rendered:
+        """Render the object under any number of lights: light adds up. Under none the object is black.
+
+        Arguments and errors otherwise as of ``picture``.
+        """
+        dark = DirectionalLight(-camera.forward, 0.0)
+        found = [self.picture(camera, light, settings) for light in lights or (dark,)]
+        first = found[0]
+        if len(found) == 1:
+            return first
+        colour: FloatArray = np.sum([each.image.colour for each in found], axis=0)
+        seconds = {name: sum(each.seconds[name] for each in found) for name in first.seconds}
+        image = LinearImage(colour, first.image.alpha, first.image.depth)
+        return Rendered(image, sum(each.samples for each in found), first.rays, seconds)
+
+
+def open_vision(of: ObjectFile, threads: int | None = None) -> ObjectVision:
+    """Open the look of an object, ready for pictures.
+
+    Args:
+        of: the object.
+        threads: of the networks; None for as many as the process has cores.
+
+    Raises:
+        DataRefused: it has no look, a file of it is damaged, or is not the one described.
+    """
+    entry = of.description.vision
+    if entry is None:
+        raise DataRefused(f"{of.folder} has no vision; add it with `touchstone object build --only vision`")
+    surface = of.mesh
+    if entry.surface is not None:
+        surface = mesh_from_ply(of.read(entry.surface), entry.surface.file)
+    renderer = VisionRenderer(of.read(entry.network), surface, threads, entry.network.file)
+    require_described(renderer.networks, entry)
+    require_self_test(renderer.networks.network, entry.network.self_test)
+    return ObjectVision(entry, surface, renderer)
+
+
+def require_described(networks: VisionNetworks, entry: VisionEntry) -> None:
+    """Refuse networks that are not those of an entry.
+
+    Raises:
+        DataRefused: the first thing that differs.
+    """
+    grid, size, name = networks.grid, networks.size, entry.network.file
+    pairs = (
+        ("networks", len(grid), entry.grid.networks),
+        ("least corner, m", tuple(grid.low.tolist()), entry.grid.low_m),
+        ("cells of m", grid.cell, entry.grid.cell_m),
+        ("cells a side", tuple(grid.shape.tolist()), entry.grid.cells),
+        ("level", size.kind, entry.level),
+        ("width", size.width, entry.size.width),
+        ("octaves of places", size.octaves, entry.size.octaves),
+        ("octaves of directions", size.turns, entry.size.turns),
+        ("samples of a block", networks.block, entry.size.block),
+        ("density of 1 in 1/m", np.float32(networks.density_scale), np.float32(entry.density_per_m)),
+    )
+    for what, held, said in pairs:
+        if held != said:
+            raise DataRefused(
+                f"{name}: its {what}: {held}, where object.json says {said}; they were not built together, "
+                "build again"
+            )

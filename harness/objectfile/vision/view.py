@@ -7,7 +7,7 @@ from harness.basics.errors import OutOfDomain
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import rotation_about, transform
 from harness.basics.mesh import Mesh
-from harness.objectfile.vision.coverage.outline import is_closed
+from harness.objectfile.vision.coverage import is_closed
 from harness.picture.pinhole import DirectionalLight, Pinhole, Vector
 
 FIELD_OF_VIEW = float(np.radians(40.0))

@@ -14,17 +14,17 @@ from harness.basics.clock import now
 from harness.commands.output import ANSWERS
 from harness.live_view.frames import LiveFrames
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.vision.vision import open_vision
+from harness.objectfile.vision.render import open_vision
 from tests.support import browser
 from tests.support.served_look import served
 
-_CASES = (("fused", 256), ("one_sample", 256), ("fused", 128), ("fused", 400))
+_SIZES = (128, 256, 400)
 _COUNT = "window.shown = 0;new MutationObserver(() => window.shown++).observe(by('frame'), {childList: true})"
 _MILLISECONDS = "parseFloat(by('frame').textContent)"
 
 
 def main() -> None:
-    """Print a line for each level and size."""
+    """Print a line for each size."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--drags", type=int, default=5, help="of 40 steps, each there and back")
@@ -34,8 +34,8 @@ def main() -> None:
     with served(frames) as server, browser.shown(server.url) as page:
         page.wait("by('samples').textContent")
         page.tell(_COUNT)
-        for level, size in _CASES:
-            page.tell(f"by('level').value = '{level}'; by('size').value = '{size}'; ask()")
+        for size in _SIZES:
+            page.tell(f"by('size').value = '{size}'; ask()")
             page.drag((300, 300), (80, 10), 20)
             rates, took = [], []
             for k in range(asked.drags):
@@ -46,7 +46,7 @@ def main() -> None:
                 took.append(page.tell(_MILLISECONDS))
             low, middle, high = np.quantile(rates, [0.0, 0.5, 1.0])
             ANSWERS.print(
-                f"{level}, {size} a side: {middle:.0f} ({low:.0f} to {high:.0f}) pictures a second; "
+                f"{size} a side: {middle:.0f} ({low:.0f} to {high:.0f}) pictures a second; "
                 f"the last of each drag took {np.median(took):.0f} ms from asked for to shown"
             )
 

@@ -14,8 +14,8 @@ import numpy as np
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.commands.output import ANSWERS
 from harness.objectfile.file import ObjectFile
+from harness.objectfile.vision.render import open_vision
 from harness.objectfile.vision.view import camera_for, light_for, turned
-from harness.objectfile.vision.vision import open_vision
 from harness.picture.linear_image import LinearImage
 from harness.picture.live_picture import compare_live
 from harness.picture.srgb import bytes_from_linear

@@ -16,9 +16,9 @@ from harness.authoring.vision.cells import CellTraining
 from harness.authoring.vision.data import HeldOutViews
 from harness.authoring.vision.lessons import OPAQUE, draw_for
 from harness.authoring.vision.profiles import vision_profile
+from harness.authoring.vision.surface_cells import surface_cells
 from harness.commands.output import ANSWERS
-from harness.objectfile.vision.network.network import VisionGrid
-from harness.objectfile.vision.shell import grid_of, lattice_of, surface_shell
+from harness.objectfile.vision.network import PER_CELL, VisionGrid
 from harness.sim.light.appearance_source import appearance_of
 from harness.sim.light.direct_image import LitObject
 
@@ -34,17 +34,16 @@ def main() -> None:
     given = parser.parse_args()
     spec = replace(vision_profile(given.profile).networks, places=given.places)
     lit = LitObject(appearance_of(given.mesh, "m"))
-    lattice = lattice_of(lit.appearance.mesh, spec.cells)
-    shell = surface_shell(lit.appearance.mesh, lattice)
-    lessons, lamps = draw_for(spec.size.kind, lit, spec.places, shell.voxel, 0, HeldOutViews((), ()))
-    grid = grid_of(shell, lattice)
+    grid = surface_cells(lit.appearance.mesh, spec.cells)
+    voxel = grid.cell / PER_CELL
+    lessons, lamps = draw_for(spec.size.kind, lit, spec.places, voxel, 0, HeldOutViews((), ()))
     middle = grid.cells[len(grid) // 2 :][:1]
     for steps in (1, *given.steps):
         chosen = replace(spec, steps=steps)
         rates = []
         for _ in range(given.repeat if steps > 1 else 1):
             alone = VisionGrid(grid.low, grid.cell, middle)
-            training = CellTraining(chosen, alone, lessons, lamps, OPAQUE / shell.voxel, 0, 1)
+            training = CellTraining(chosen, alone, lessons, lamps, OPAQUE / voxel, 0, 1)
             begun = time.process_time()
             training.step_epoch()
             rates.append(steps * spec.batch / (time.process_time() - begun) / 1e6)

@@ -1,4 +1,4 @@
-"""What networks of vision err by and cost to train: pictures kept back, steps, borders between cells.
+"""What networks of vision err by and cost to train: pictures kept back, steps.
 
 python tests/benchmarks/vision/bench_vision_training.py builtin:mug builtin:bowl --profile smoke
 python tests/benchmarks/vision/bench_vision_training.py FILE.obj \
@@ -17,22 +17,17 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from rich.console import Console
 
-from harness.authoring.vision.data import HeldOutViews, draw_tuples, held_out_pictures
+from harness.authoring.vision.data import HeldOutViews, held_out_pictures
 from harness.authoring.vision.metrics import BEHIND, network_pictures, picture_errors, reference_pictures
 from harness.authoring.vision.profiles import VisionProfile, vision_profile
 from harness.authoring.vision.vision import author_vision
 from harness.basics.arrays import ByteArray
-from harness.objectfile.vision.coverage.outline import is_closed, mesh_outline
-from harness.objectfile.vision.network.graph import FILE, vision_graph, vision_model
-from harness.objectfile.vision.network.network import VisionModel
-from harness.objectfile.vision.network.plain import Query, evaluate
-from harness.objectfile.vision.render import VisionRenderer
-from harness.objectfile.vision.settings import RenderSettings
-from harness.objectfile.vision.threads import Crew, Workspace
+from harness.objectfile.vision.coverage import Contours, mesh_outline
+from harness.objectfile.vision.graph import FILE, vision_graph
+from harness.objectfile.vision.render import RenderSettings, VisionRenderer
 from harness.picture.image_file import write_png
 from harness.picture.linear_image import LinearImage
 from harness.picture.pinhole import DirectionalLight, Pinhole
-from harness.picture.srgb import bytes_from_linear
 from harness.sim.light.appearance import Appearance
 from harness.sim.light.appearance_source import appearance_of
 from harness.sim.light.direct_image import LitObject
@@ -42,11 +37,8 @@ CONSOLE = Console(width=140, highlight=False, emoji=False)
 
 WAYS = {
     "default": RenderSettings(),
-    "lead 1": RenderSettings(lead=1.0),
     "coverage 5": RenderSettings(coverage=5),
     "rays 2": RenderSettings(rays=2),
-    "one sample": RenderSettings(level="one_sample"),
-    "whole shell": RenderSettings(termination=0.0),
 }
 
 
@@ -76,7 +68,7 @@ def measure(name: str, steps: int | None, given: argparse.Namespace) -> ByteArra
     look, profile = appearance_of(name, given.units), chosen(steps, given)
     if given.built:
         CONSOLE.print(f"{Path(name).stem}, as {given.built} has it")
-        return by_ways(look, vision_model((given.built / FILE).read_bytes()), profile, given)
+        return by_ways(look, (given.built / FILE).read_bytes(), profile, given)
     on_core = time.process_time()
     with TemporaryDirectory() as folder:
         made = author_vision(look, profile, given.seed, Path(folder), unsaid, given.threads)
@@ -89,7 +81,7 @@ def measure(name: str, steps: int | None, given: argparse.Namespace) -> ByteArra
     )
     if profile.strict is not None:
         CONSOLE.print(f"  told no more than the paper's {line(made.errors, 'strict_')}")
-    return by_ways(look, made.model, profile, given)
+    return by_ways(look, vision_graph(made.model).SerializeToString(), profile, given)
 
 
 def unsaid(_what: str, _share: float) -> None:
@@ -119,14 +111,12 @@ def line(errors: Mapping[str, float], before: str = "") -> str:
     return f"{whole:6.2f} dB, worst {worst:6.2f}, object alone {alone:6.2f}, ssim {alike:.4f}"
 
 
-def by_ways(
-    look: Appearance, model: VisionModel, profile: VisionProfile, given: argparse.Namespace
-) -> ByteArray:
+def by_ways(look: Appearance, data: bytes, profile: VisionProfile, given: argparse.Namespace) -> ByteArray:
     """What settings of the renderer make of the same networks; pictures of the default."""
     lit = LitObject(look)
     held_out = held_out_pictures(look.mesh, profile.pictures, profile.side, profile.side, given.seed)
     exact = reference_pictures(lit, held_out, profile.samples)
-    renderer = VisionRenderer(vision_graph(model).SerializeToString(), look.mesh, given.threads)
+    renderer = VisionRenderer(data, look.mesh, given.threads)
     drawn: dict[str, list[LinearImage]] = {}
     for way, settings in WAYS.items():
         drawn[way] = network_pictures(renderer, held_out, settings)
@@ -139,14 +129,13 @@ def by_ways(
         CONSOLE.print(
             f"  exact colours, one ray a pixel, coverage {side}: {line(picture_errors(exact, limit))}"
         )
-    CONSOLE.print(f"  across borders between cells {across_borders(model, lit):.2f}/255")
     return np.hstack([beside(exact[0], drawn["default"][0]), beside(exact[-1], drawn["default"][-1])])
 
 
 def one_ray(lit: LitObject, camera: Pinhole, light: DirectionalLight, side: int) -> LinearImage:
     """What networks without error would give: exact light where the renderer's outline asks for it."""
     mesh, (x, y) = lit.appearance.mesh, camera.centre_px
-    outline = mesh_outline(mesh, is_closed(mesh), camera, side, Crew(1), Workspace())
+    outline = mesh_outline(Contours.of(mesh), camera, side)
     across, down = (outline.places[:, k] - centre for k, centre in enumerate((x, y)))
     ways = np.stack([across, down, np.full(len(down), camera.focal_px)], axis=1).astype(np.float64)
     ways = ways / np.linalg.norm(ways, axis=1, keepdims=True) @ camera.object_from_camera[:3, :3].T
@@ -170,34 +159,6 @@ def difference(one: LinearImage, other: LinearImage) -> float:
     """Mean square over pixels and channels, of light as shown before white, 0 to 1."""
     apart = one.display(BEHIND).astype(np.float64) - other.display(BEHIND)
     return float(np.mean((apart / 255.0) ** 2))
-
-
-def across_borders(model: VisionModel, lit: LitObject) -> float:
-    """Root mean square of what two neighbours differ by at their border, grey levels as shown; lit places."""
-    grid, told = model.grid, draw_tuples(lit, 200_000, 7, HeldOutViews((), ()))
-    scaled = (told.points - grid.low) / grid.cell
-    away = np.abs(scaled - np.round(scaled))
-    axis = np.argmin(away, axis=1)
-    near = np.flatnonzero((away.min(axis=1) < 0.01) & told.visible)
-    border = told.points[near].copy()
-    rows = np.arange(len(near))
-    border[rows, axis[near]] = (grid.low + grid.cell * np.round(scaled[near]))[rows, axis[near]]
-    beyond = np.zeros_like(border)
-    beyond[rows, axis[near]] = 1e-6 * grid.cell
-    sides = [grid.networks(border + by) for by in (-beyond, beyond)]
-    both = np.flatnonzero((sides[0] >= 0) & (sides[1] >= 0) & (sides[0] != sides[1]))[:2000]
-    extras = np.concatenate([told.visible[near, None], told.normals[near]], axis=1)
-    if not model.weights.size.extras:
-        extras = np.empty((len(near), 0))
-    found = [np.empty((len(both), 3)) for _ in sides]
-    for k, side in enumerate(sides):
-        for row, i in enumerate(both):
-            one = slice(i, i + 1)
-            light = told.lights[near[i]]
-            asked = Query(side[one], border[one], told.views[near[i : i + 1]], light, extras[one])
-            found[k][row] = evaluate(model, asked)[1][0]
-    shown = [bytes_from_linear(each).astype(np.float64) for each in found]
-    return float(np.sqrt(np.mean((shown[0] - shown[1]) ** 2)))
 
 
 def beside(exact: LinearImage, found: LinearImage) -> ByteArray:

@@ -14,14 +14,14 @@ import numpy as np
 from harness.commands.output import ANSWERS
 from harness.live_view.frames import LiveFrames
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.vision.vision import open_vision
+from harness.objectfile.vision.render import open_vision
 from tests.support.served_look import served
 
-_CASES = (("fused", 256), ("one_sample", 256), ("fused", 128), ("fused", 400))
+_SIZES = (128, 256, 400)
 
 
 def main() -> None:
-    """Print a line for each level and size."""
+    """Print a line for each size."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--frames", type=int, default=40)
@@ -35,19 +35,19 @@ def main() -> None:
 
 
 def _measure(wire: HTTPConnection, frames: int) -> None:
-    for level, size in _CASES:
-        _turn(wire, level, size, 2)
+    for size in _SIZES:
+        _turn(wire, size, 2)
         begun, clock = time.process_time(), time.perf_counter()
-        _turn(wire, level, size, frames)
+        _turn(wire, size, frames)
         cpu, took = time.process_time() - begun, time.perf_counter() - clock
         each = 1e3 / frames
-        ANSWERS.print(f"{level}, {size} a side: {cpu * each:.1f} ms of CPU, {took * each:.1f} on the clock")
+        ANSWERS.print(f"{size} a side: {cpu * each:.1f} ms of CPU, {took * each:.1f} on the clock")
 
 
-def _turn(wire: HTTPConnection, level: str, size: int, frames: int) -> None:
+def _turn(wire: HTTPConnection, size: int, frames: int) -> None:
     for angle in np.linspace(0.0, 2.0 * np.pi, frames, endpoint=False):
         eye = f"{0.3 * np.cos(angle)},{0.3 * np.sin(angle)},0.2"
-        wire.request("GET", f"/frame.png?camera={eye}&level={level}&width={size}&height={size}")
+        wire.request("GET", f"/frame.png?camera={eye}&width={size}&height={size}")
         answer = wire.getresponse()
         answer.read()
         if answer.status != 200:

@@ -38,14 +38,13 @@ def test_a_scene_camera_sees_what_rays_and_lights_say() -> None:
     assert np.abs(bare.image.colour - wanted.image.colour).max() > 0.1
 
 
-@pytest.mark.parametrize("level", ["network", "onnx", "one_sample"])
-def test_a_scene_camera_takes_its_picture_from_the_networks(tmp_path: Path, level: str) -> None:
+def test_a_scene_camera_takes_its_picture_from_the_networks(tmp_path: Path) -> None:
     """Of a known look; two lamps add up, and no ray on the mesh is followed for it."""
     of = box_file(tmp_path / "box")
     named = SCENE.object.model_copy(update={"objectfile": str(of.folder)})
     update = {"observe": ("camera.image",), "object": named}
     scene = SCENE.model_copy(update=update)
-    accuracy = default_accuracy(EFFECTS).with_({"camera.look": level})
+    accuracy = default_accuracy(EFFECTS).with_({"camera.look": "network"})
     made = scene_plan(scene, GELSIGHT_R15, accuracy)
     assert [step.effect.provides for step in made.ran] == ["object.vision", "camera.image"]
     lamps = tuple(DirectionalLight(np.array(way)) for way in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
@@ -72,3 +71,9 @@ def test_a_picture_by_networks_needs_an_objectfile_in_the_scene() -> None:
     accuracy = default_accuracy(EFFECTS).with_({"camera.look": "network"})
     with pytest.raises(WrongUse, match="names no ObjectFile"):
         scene_plan(scene, GELSIGHT_R15, accuracy)
+
+
+@pytest.mark.parametrize("level", ["onnx", "one_sample"])
+def test_a_level_that_was_removed_names_the_one_in_its_place(level: str) -> None:
+    with pytest.raises(WrongUse, match=rf"camera\.look no longer has the level '{level}'; take network"):
+        default_accuracy(EFFECTS).with_texts([f"camera.look={level}"])

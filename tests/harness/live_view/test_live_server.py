@@ -16,7 +16,7 @@ from harness.cli import invoke
 from harness.live_view.frames import NAMES, LiveFrames
 from harness.live_view.server import SAID, LiveServer, page
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.vision.vision import open_vision
+from harness.objectfile.vision.render import open_vision
 from tests.samples.look_bench import box_file, told_look
 from tests.support.served_look import served
 
@@ -58,22 +58,21 @@ def frame(server: LiveServer, **asked: object) -> Answer:
     return get(server, "/frame.png?" + urlencode(asked))
 
 
-@pytest.mark.parametrize("level", ["fused", "onnx", "one_sample"])
 def test_a_frame_is_the_command_s_picture_bit_for_bit(
-    server: LiveServer, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], level: str
+    server: LiveServer, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "a.png"
     eye, light = ("0.25", "-0.2", "0.2"), ("1", "-1", "2")
-    told = ["--camera", *eye, "--light", *light, "--size", "48x36", "--level", level, "--threads", "1"]
+    told = ["--camera", *eye, "--light", *light, "--size", "48x36", "--threads", "1"]
     assert invoke(["object", "render", "vision", str(folder), *told, "--out", str(out), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
-    asked = {"camera": ",".join(eye), "light": ",".join(light), "width": 48, "height": 36, "level": level}
+    asked = {"camera": ",".join(eye), "light": ",".join(light), "width": 48, "height": 36}
     for _ in range(2):  # another picture between them leaves nothing behind
         seen = frame(server, **asked)
         assert (seen.status, seen.headers["Content-Type"]) == (200, "image/png")
         assert seen.body == out.read_bytes()
         made = json.loads(seen.headers[SAID])
-        assert (made["level"], made["samples"], made["rays"]) == (level, said["samples"], said["rays"])
+        assert (made["samples"], made["rays"]) == (said["samples"], said["rays"])
         assert set(made["seconds"]) == {"wait", "render", "encode"}
         assert frame(server, width=20, height=31, camera="-0.3,0.1,0").status == 200
 
@@ -134,7 +133,7 @@ def test_the_page_needs_nothing_from_elsewhere(server: LiveServer) -> None:
         ("/frame.png?width=0", 400, "a picture of 0 x 256 pixels"),
         ("/frame.png?width=8192&height=8192", 400, "at most 4194304"),
         ("/frame.png?width=64&width=65", 400, "given twice"),
-        ("/frame.png?level=fuse", 400, "did you mean 'fused'?"),
+        ("/frame.png?level=fused", 400, "no picture has a 'level'"),
         ("/frame.png?field_of_view=wide", 400, "a number of radians"),
         ("/frame.png?field_of_view=nan", 400, "between 0 and 180 deg"),
         ("/frame.png?field_of_view=4", 400, "between 0 and 180 deg"),

@@ -20,7 +20,7 @@ from harness.objectfile.audio.audio import open_audio
 from harness.objectfile.file import ObjectFile, create_object
 from harness.objectfile.touch.tool_depth import open_tool_depth
 from harness.objectfile.touch.touch import open_touch
-from harness.objectfile.vision.vision import open_vision
+from harness.objectfile.vision.render import open_vision
 from tests.oracles.seen_shapes import cuboid
 from tests.samples import touch_bench as tb
 from tests.samples.look_bench import box_file

@@ -145,7 +145,7 @@ def built_views(
     import numpy as np
 
     from harness.objectfile.published.camera import views_of
-    from harness.objectfile.vision.vision import open_vision
+    from harness.objectfile.vision.render import open_vision
     from harness.picture.image_file import write_png
     from harness.picture.pinhole import DirectionalLight
 

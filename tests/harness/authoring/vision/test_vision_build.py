@@ -11,18 +11,17 @@ import trimesh
 from harness.authoring.training import Report
 from harness.authoring.vision import object_vision
 from harness.authoring.vision import profiles as vision_profiles
-from harness.authoring.vision.finish_profiles import CellsFinish
 from harness.authoring.vision.object_vision import drawn_surface, without_seams
 from harness.authoring.vision.profiles import CellsSpec, VisionProfile
-from harness.authoring.vision.vision import CHECKPOINT, AuthoredVision, author_vision, checkpoints
+from harness.authoring.vision.vision import CHECKPOINT, AuthoredVision, author_vision
 from harness.basics.mesh import Mesh
 from harness.cli import invoke
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.same_object import is_same_surface
 from harness.objectfile.verify.verify import verify
-from harness.objectfile.vision.coverage.outline import is_closed
-from harness.objectfile.vision.network.network import NetworkSize
-from harness.objectfile.vision.vision import open_vision
+from harness.objectfile.vision.coverage import is_closed
+from harness.objectfile.vision.network import NetworkSize
+from harness.objectfile.vision.render import open_vision
 from harness.objects.household import build
 from harness.sim.light.appearance import Appearance
 
@@ -34,8 +33,6 @@ TINY = VisionProfile(
     side=24,
     samples=2,
 )
-
-FINISH = CellsFinish(pictures=2, side=24, samples=2, rounds=1, steps=20)
 
 
 @pytest.fixture
@@ -83,22 +80,6 @@ def test_a_block_becomes_an_object_file_that_can_be_looked_at(
     assert (of.folder / "object.json").read_bytes() == first
 
 
-@pytest.mark.slow  # a second training; its parts stay
-def test_networks_are_finished_on_pictures_where_that_is_asked_for(
-    block: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(vision_profiles, "CellsFinish", lambda: FINISH)
-    assert built(block, "--finish", "--json") == 0
-    answer = json.loads(capsys.readouterr().out)
-    assert answer["settings"]["finish_pictures"] == FINISH.pictures
-    assert {"psnr_db", "unfinished_psnr_db", "unfinished_ssim"} <= set(answer["errors"])
-    assert answer["errors"]["psnr_db"] != answer["errors"]["unfinished_psnr_db"]
-    assert {"pictures", "finish", "unfinished_measure"} <= set(answer["seconds"])
-    of = ObjectFile.open(block.parent / "object")
-    assert all(check.passed for check in verify(of)), verify(of)
-    assert not [each for each in checkpoints(of.folder) if each.exists()]
-
-
 def test_a_build_that_is_killed_keeps_what_there_was_and_goes_on(
     block: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -139,8 +120,7 @@ def test_a_build_that_is_killed_keeps_what_there_was_and_goes_on(
         (("--material", "cheese"), "no material"),
         (("--wall", "3"), "--wall"),
         (("--units", "yd"), "unknown unit 'yd'"),
-        (("--only", "touch", "--finish"), "--finish is of vision, and --only touch was asked for"),
-        (("--only", "audio", "--finish"), "--finish is of vision, and --only audio was asked for"),
+        (("--finish",), "--finish was removed: networks no longer learn from pictures; say --profile paper"),
     ],
 )
 def test_what_cannot_be_built_is_wrong_use(

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from harness.authoring.vision.cells import CellTraining
-from harness.authoring.vision.cost import DEFAULT, Studio, Way, every_sample, measured, ways
+from harness.authoring.vision.cost import DEFAULT, Studio, Way, measured, ways
 from harness.authoring.vision.data import held_out_pictures
 from harness.authoring.vision.profiles import CellsSpec
 from harness.basics.errors import DataRefused
-from harness.objectfile.vision.network.network import NetworkSize
-from harness.objectfile.vision.settings import RenderSettings
+from harness.objectfile.vision.network import NetworkSize
+from harness.objectfile.vision.render import RenderSettings
 from harness.sim.light.appearance import plain
 from harness.sim.light.direct_image import LitObject
 from tests.oracles.seen_shapes import ball
@@ -52,17 +52,6 @@ def test_each_way_turns_one_knob_and_none_is_there_twice() -> None:
             way.networks != TINY,
         ]
         assert sum(turned) == 1
-
-
-def test_many_samples_leave_nothing_out_of_themselves_and_few_leave_out_more(studio: Studio) -> None:
-    finest = every_sample(RenderSettings())
-    settings = (finest, replace(finest, step=0.5), RenderSettings(step=4.0))
-    found = measured([replace(PLAIN, settings=each) for each in settings], studio, 2, unsaid)
-    many = [each.worth.many["psnr_db"] for each in found]
-    assert math.isinf(many[0])
-    assert many[0] > many[1] > many[2]
-    samples = [each.worth.samples for each in found]
-    assert samples[0] > samples[1] > samples[2]
 
 
 def test_the_error_of_a_view_is_that_of_its_peak_signal_to_noise_ratio(studio: Studio) -> None:

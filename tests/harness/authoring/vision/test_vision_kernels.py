@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.authoring.vision.batch import Lesson, Pixels, batch_of, encode
+from harness.authoring.vision.batch import Lesson, batch_of, encode
 from harness.authoring.vision.kernels import _adam, _back, _forth, _wrong
 from harness.authoring.vision.layers import (
     first_weights,
@@ -15,9 +15,9 @@ from harness.authoring.vision.layers import (
     weights_of,
 )
 from harness.basics.arrays import AnyArray
-from harness.objectfile.vision.network.network import VisionGrid, VisionModel
-from harness.objectfile.vision.network.plain import Query, evaluate
+from harness.objectfile.vision.network import VisionGrid, VisionModel
 from harness.sim.light.direct_image import LitObject
+from tests.oracles.plain_networks import Query, evaluate, local_places
 from tests.samples.taught_ball import SIZE, lit_ball
 
 
@@ -27,12 +27,9 @@ def lit() -> LitObject:
 
 
 def test_slopes_are_those_of_the_error(lit: LitObject) -> None:
-    """Against differences of the loss, in the middle of the range, where no slope is raised.
-
-    Of a batch of places and of samples of pictures, whose density is no error.
-    """
+    """Against differences of the loss, in the middle of the range, where no slope is raised."""
     random = np.random.default_rng(5)
-    count, places, shapes = 64, 40, layer_shapes(SIZE)
+    count, shapes = 64, layer_shapes(SIZE)
     flat = first_weights(SIZE, 1)
     layers_of(flat, SIZE).colour_bias[:] = 0.0
     slope = np.zeros_like(flat)
@@ -46,12 +43,6 @@ def test_slopes_are_those_of_the_error(lit: LitObject) -> None:
         random.random(count).astype(np.float32),
         np.empty((0, 3), np.float32),
     )
-    pixels = Pixels(
-        np.empty((count, SIZE.place), np.float32),
-        np.empty((count, shapes.told[0]), np.float32),
-        np.empty((count, 3), np.float32),
-        random.random(count).astype(np.float32),
-    )
     batch.at[:] = np.arange(count)
     encode(random.uniform(-1, 1, (count, 3)).astype(np.float32), octave_factors(SIZE), 0, batch.encoded)
     batch.told[:] = random.standard_normal(batch.told.shape)
@@ -61,8 +52,8 @@ def test_slopes_are_those_of_the_error(lit: LitObject) -> None:
     def loss(at: AnyArray) -> float:
         layers = layers_of(at, SIZE)
         _forth(layers, batch.encoded, batch.told, batch)
-        raw = (batch.raw[:, 0].astype(np.float64) + layers.density_bias[0] - lesson.depth)[:places]
-        wrong = _wrong(layers, lesson, pixels, places, opacity, batch)
+        raw = batch.raw[:, 0].astype(np.float64) + layers.density_bias[0] - lesson.depth
+        wrong = _wrong(layers, lesson, opacity, batch)
         return 0.5 * float(wrong + opacity * (raw**2).sum()) / count
 
     loss(flat)
@@ -91,7 +82,7 @@ def test_what_is_written_answers_as_what_was_trained() -> None:
     for cell in (0, 1):
         at = np.flatnonzero(networks == cell)
         batch = batch_of(len(at), size.place, layer_shapes(size).told[0], size.width)
-        local = grid.local(points[at], networks[at]).astype(np.float32)
+        local = local_places(grid, points[at], networks[at]).astype(np.float32)
         encode(local, octave_factors(size), 0, batch.encoded)
         encode(np.tile(light, (len(at), 1)).astype(np.float32), np.ones(2, np.float32), 0, batch.told)
         batch.told[:, -4:] = extras[at]

@@ -12,7 +12,7 @@ from harness.authoring.vision.layers import (
 from harness.authoring.vision.profiles import VisionProfile, vision_profile
 from harness.authoring.vision.vision import author_vision
 from harness.basics.errors import WrongUse
-from harness.objectfile.vision.network.network import COMPACT, PAPER
+from harness.objectfile.vision.network import COMPACT, PAPER
 from harness.sim.light.direct_image import LitObject
 from tests.samples.taught_ball import SIZE, TINY, lit_ball
 
@@ -30,15 +30,6 @@ def test_profiles_are_as_large_as_they_are_named() -> None:
     # The paper's very network, of 20 292 parameters.
     assert paper.strict.size == PAPER
     assert paper.strict.size.parameters == 20_292
-
-
-def test_what_is_finished_is_so_once_and_all_of_it() -> None:
-    standard, paper = vision_profile("standard"), vision_profile("paper")
-    assert standard.finish is None
-    finished = standard.finished()
-    assert finished.finish == paper.finish is not None
-    assert (finished.networks, finished.strict) == (standard.networks, standard.strict)
-    assert finished.finished() == finished
 
 
 @pytest.mark.slow  # of the longest training alone

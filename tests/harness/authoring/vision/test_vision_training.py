@@ -12,10 +12,10 @@ from harness.authoring.vision.metrics import picture_errors
 from harness.authoring.vision.profiles import VisionProfile
 from harness.authoring.vision.vision import CHECKPOINT, STRICT_CHECKPOINT, author_vision
 from harness.basics.errors import DataRefused
-from harness.objectfile.vision.network.network import VisionModel
-from harness.objectfile.vision.network.plain import Query, evaluate
+from harness.objectfile.vision.network import VisionModel
 from harness.picture.linear_image import LinearImage
 from harness.sim.light.direct_image import LitObject
+from tests.oracles.plain_networks import Query, evaluate
 from tests.samples.taught_ball import RADIUS, SIZE, TINY, grid_for, lit_ball, training_of
 
 

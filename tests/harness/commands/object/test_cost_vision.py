@@ -10,7 +10,7 @@ import trimesh
 from harness.authoring.vision import profiles as vision_profiles
 from harness.authoring.vision.profiles import CellsSpec, VisionProfile
 from harness.cli import invoke
-from harness.objectfile.vision.network.network import NetworkSize
+from harness.objectfile.vision.network import NetworkSize
 
 TINY = VisionProfile(
     CellsSpec(NetworkSize(width=8, octaves=2, turns=1, kind="osf-v"), cells=4, places=20_000, steps=60),
@@ -36,15 +36,17 @@ def cost(block: Path, *more: str) -> int:
 
 @pytest.mark.slow  # curves of sound and touch stay
 def test_a_knob_is_turned_and_its_curve_kept(block: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    knobs = ("--knob", "termination", "--knob", "grid")
+    knobs = ("--knob", "coverage", "--knob", "grid")
     assert cost(block, *knobs, "--json") == 0
     answer = json.loads(capsys.readouterr().out)
     out = block.parent / "cost"
     assert json.loads((out / "curve.json").read_text()) == answer
     assert Path(answer["picture"]).read_bytes().startswith(b"\x89PNG")
     points = answer["points"]
-    turned = [point["levels"]["level"] for point in points if point["levels"]["knob"] == "termination"]
-    assert turned == ["0.3", "0.1", "0.01", "0"]
+    turned = [
+        point["levels"]["level"] for point in points if point["levels"]["knob"] == "coverage, sub-pixels"
+    ]
+    assert turned == ["1", "5", "7"]
     assert any(point["front"] for point in points)
     for point in points:
         assert point["seconds"] > 0.0
@@ -55,14 +57,16 @@ def test_a_knob_is_turned_and_its_curve_kept(block: Path, capsys: pytest.Capture
     assert cost(block, *knobs) == 0
     said = capsys.readouterr().out
     assert {path: path.stat().st_mtime_ns for path in out.glob("*.onnx")} == before
-    for words in ("termination", "grid, cells", "CPU, ms", "curve.png"):
+    for words in ("coverage", "grid, cells", "CPU, ms", "curve.png"):
         assert words in said
 
 
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (("--knob", "terminaton"), "no knob 'terminaton'; did you mean 'termination'"),
+        (("--knob", "coverige"), "no knob 'coverige'; did you mean 'coverage'"),
+        (("--knob", "termination"), "--knob termination: a ray ends where it meets the surface; there are"),
+        (("--knob", "lead"), "there are default, coverage, rays, side, grid, width, told"),
         (("--profile", "fine"), "no profile 'fine' of vision"),
         (("--units", "yd"), "unknown unit 'yd'"),
         (("--size", "8"), "greater than or equal to 16"),

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from onnx import load_model_from_string, numpy_helper
 
+from harness.authoring.vision.surface_cells import surface_cells
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.basics.mesh import Mesh
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.surface_file import ply_bytes
 from harness.objectfile.verify.verify import verify
-from harness.objectfile.vision.network.network import VisionGrid
+from harness.objectfile.vision.network import VisionGrid
 from harness.objectfile.vision.part import VisionPart, with_vision
-from harness.objectfile.vision.render import VisionRenderer
-from harness.objectfile.vision.vision import open_vision, vision_level
+from harness.objectfile.vision.render import VisionRenderer, open_vision
 from harness.picture.pinhole import DirectionalLight
-from tests.oracles.plain_look import even_look, file_of, filled_grid, looking
+from tests.oracles.plain_look import even_look, file_of, looking
 from tests.oracles.seen_shapes import cuboid
 from tests.samples.look_bench import BOX, LOGITS, box_file, box_look, box_part, told_look
 from tests.samples.object_bench import exchange, rewrite
@@ -49,7 +49,7 @@ def test_a_look_as_it_was_built_passes_every_check(box_object: ObjectFile) -> No
     assert [check.name for check in checks] == [
         *(f"{name}: bytes" for name in ("mesh.ply", "vision.onnx")),
         *("folder: nothing else", "mesh", "vision: graph", "vision: domain", "vision: self-test"),
-        *("vision: networks", "vision: graph and weights", "vision: networks and surface"),
+        *("vision: networks", "vision: networks and surface"),
     ]
 
 
@@ -136,19 +136,19 @@ def test_networks_of_another_object_are_told_by_looking(spoiled: Path, box_objec
     found = failures(rewrite(empty.folder, say))
     assert set(found) == {"vision: self-test", "vision: networks and surface"}
     assert "another object's network" in found["vision: networks and surface"]
-    small = filled_grid(cuboid(0.05, 0.05, 0.05), 8, 1.0)
+    small = surface_cells(cuboid(0.05, 0.05, 0.05), 8)
     with pytest.raises(DataRefused, match="different objects"):
         with_vision(box_object, box_part(even_look(small, 1e6, LOGITS)))
 
 
-def test_a_graph_that_computes_something_else_than_its_weights_say_is_told(spoiled: Path) -> None:
-    """The fast level goes by the weights' names, the portable one by the graph: both must be the look."""
+def test_a_graph_that_computes_something_else_is_told(spoiled: Path) -> None:
     model = load_model_from_string((spoiled / "vision.onnx").read_bytes())
     last = next(node for node in model.graph.node if node.op_type == "Sigmoid")
     last.op_type = "Tanh"
-    found = failures(exchange(spoiled, "vision.onnx", model.SerializeToString()))
-    assert set(found) == {"vision: self-test", "vision: graph and weights"}
-    assert "different pictures" in found["vision: graph and weights"]
+    of = exchange(spoiled, "vision.onnx", model.SerializeToString())
+    assert "vision: self-test" in failures(of)
+    with pytest.raises(DataRefused, match="differs from what it gave"):
+        open_vision(of)
 
 
 def test_weights_that_are_not_finite_are_refused(spoiled: Path) -> None:
@@ -162,7 +162,7 @@ def test_weights_that_are_not_finite_are_refused(spoiled: Path) -> None:
 
 
 def test_networks_on_another_grid_are_not_those_described(spoiled: Path) -> None:
-    grid = filled_grid(BOX, 8, 1.0)
+    grid = surface_cells(BOX, 8)
     moved = VisionGrid(grid.low + 1e-4, grid.cell, grid.cells)
     of = exchange(spoiled, "vision.onnx", file_of(even_look(moved, 1e6, LOGITS)))
     with pytest.raises(DataRefused, match=r"least corner, m: .* where object\.json says"):
@@ -195,12 +195,6 @@ def test_an_object_without_a_look_says_how_to_make_one(egg_object: ObjectFile) -
         open_vision(egg_object)
 
 
-@pytest.mark.parametrize("level", ["fuse", "onnxx", "", "nerf"])
-def test_an_unknown_level_names_those_there_are(level: str) -> None:
-    with pytest.raises(WrongUse, match="fused, one_sample, onnx"):
-        vision_level(level)
-
-
 def test_a_camera_within_the_material_is_refused_and_one_beside_it_is_not(box_object: ObjectFile) -> None:
     vision = open_vision(box_object, 1)
     for away in (0.0, 0.02, 0.0399):
@@ -215,6 +209,5 @@ def test_a_camera_within_the_material_is_refused_and_one_beside_it_is_not(box_ob
 
 def test_parts_that_cannot_be_written_are_refused(box_object: ObjectFile) -> None:
     part: VisionPart = box_part()
-    for wrong in ({"block": 0}, {"per_cell": 6}, {"deep": -1.0}):
-        with pytest.raises(WrongUse):
-            with_vision(box_object, replace(part, **wrong))
+    with pytest.raises(WrongUse):
+        with_vision(box_object, replace(part, block=0))

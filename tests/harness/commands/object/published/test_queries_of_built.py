@@ -11,7 +11,7 @@ from scipy.io import wavfile
 from harness.cli import invoke
 from harness.objectfile.audio.audio import open_audio
 from harness.objectfile.touch.touch import open_touch
-from harness.objectfile.vision.vision import open_vision
+from harness.objectfile.vision.render import open_vision
 from harness.picture.image_file import read_image
 from harness.picture.pinhole import DirectionalLight, Pinhole, unit_vector
 from harness.sim.gel.press_pose import contact_place

@@ -1,30 +1,28 @@
-"""Networks of vision as a file and as a kernel: what was kept comes back, and all ways say the same."""
+"""Networks of vision as a file: what was kept comes back, and the graph says what the weights say."""
 
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import onnx
 import pytest
+from onnx import numpy_helper
 
 from harness.basics.arrays import AnyArray, FloatArray
-from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
+from harness.basics.errors import DataRefused, WrongUse
 from harness.objectfile.runtime import Network
-from harness.objectfile.vision.network.fold import folded
-from harness.objectfile.vision.network.graph import graph_block, vision_graph, vision_model
-from harness.objectfile.vision.network.kernels import ask_blocks
-from harness.objectfile.vision.network.network import (
+from harness.objectfile.vision.graph import VisionNetworks, kept_weights, vision_graph, vision_tensors
+from harness.objectfile.vision.network import (
     COMPACT,
     PAPER,
     NetworkSize,
     VisionGrid,
     VisionModel,
     VisionWeights,
+    scatter_rows,
 )
-from harness.objectfile.vision.network.plain import Query, encoded, evaluate, scatter_rows
-from harness.objectfile.vision.network.tensors import vision_tensors
-from harness.objectfile.vision.network.tiles import LANES, SAMPLES
-from harness.objectfile.vision.network.weights_codec import WEIGHTS, held_weights, kept_weights
 from tests.oracles.plain_look import SMALL, box_grid, even_look, file_of, no_weights
+from tests.oracles.plain_networks import Query, encoded, evaluate
 from tests.samples.fitted_look import drawn_look
 
 TOLD = NetworkSize(kind="osf-v")
@@ -57,7 +55,9 @@ def asked(model: VisionModel, count: int, seed: int) -> Query:
 
 def by_graph(model: VisionModel, query: Query, block: int = 4) -> tuple[AnyArray, AnyArray]:
     """Every sample in a block of its own, which it fills."""
-    network = Network(file_of(model, block), "vision.onnx", *vision_tensors(model, block))
+    network = Network(
+        file_of(model, block), "vision.onnx", *vision_tensors(model.grid, model.weights.size, block)
+    )
     count = len(query.points)
 
     def spread(rows: FloatArray, kind: str) -> AnyArray:
@@ -75,42 +75,25 @@ def by_graph(model: VisionModel, query: Query, block: int = 4) -> tuple[AnyArray
     return found["density"][:, 0, 0], found["scattered"][:, 0]
 
 
-def by_kernel(model: VisionModel, query: Query, block: int) -> tuple[AnyArray, AnyArray]:
-    """Sorted by network into blocks of at most so many."""
-    folds, count = folded(model.weights), len(query.points)
-    order = np.argsort(query.networks, kind="stable").astype(np.int32)
-    blocks = []
-    for network in np.unique(query.networks):
-        at = np.flatnonzero(query.networks[order] == network)
-        blocks += [
-            (network, first, min(block, at[-1] + 1 - first)) for first in range(at[0], at[-1] + 1, block)
-        ]
-    local = model.grid.local(query.points, query.networks).astype(np.float32)
-    density, scattered = np.full(count, np.nan, np.float32), np.full((count, 3), np.nan, np.float32)
-    size = model.weights.size
-    ask_blocks(
-        *(
-            np.array(blocks, np.int32),
-            order,
-            local,
-            np.arange(count),
-            1,
-            folds.seen(query.views.astype(np.float32)),
-        ),
-        *(query.extras.astype(np.float32), folds.packed, folds.lit(query.light), size.octaves, size.turns),
-        *(density, scattered),
-    )
-    return folds.density_scale * density.astype(np.float64), scattered
+def by_networks(model: VisionModel, query: Query, block: int = 32) -> tuple[AnyArray, AnyArray]:
+    """All samples at once, sorted by network into blocks."""
+    told = np.zeros((len(query.points), 4), np.float32)
+    told[:, : query.extras.shape[1]] = query.extras
+    views, light = query.views.astype(np.float32), query.light.astype(np.float32)
+    found = VisionNetworks(file_of(model, block)).ask(query.points, views, light, told)
+    assert found.known.all()
+    return found.density, found.scattered
 
 
 @pytest.mark.parametrize("name", SIZES)
 def test_weights_come_back_bit_for_bit(name: str) -> None:
     model = drawn_look(GRID, SIZES[name], SCALE)
     data = file_of(model)
-    back = vision_model(data)
-    assert back.weights.size == SIZES[name]
-    assert back.weights.density_scale == np.float32(SCALE)
-    for (key, given), (_, found) in zip(model.weights.arrays(), back.weights.arrays(), strict=True):
+    back, held = VisionNetworks(data), initializers(data)
+    assert (back.size, back.block) == (SIZES[name], 32)
+    assert back.density_scale == np.float32(SCALE)
+    for key, given in kept_weights(model.weights).items():
+        found = held[f"networks.{key}"]
         assert found.dtype == np.float16
         assert given.tobytes() == found.tobytes(), key
     assert np.array_equal(back.grid.cells, GRID.cells)
@@ -119,7 +102,12 @@ def test_weights_come_back_bit_for_bit(name: str) -> None:
     kept = 2 * sum(array.size for array in kept_weights(model.weights).values())
     assert kept <= 2 * len(GRID) * SIZES[name].parameters
     assert 0 < len(data) - kept < 20_000
-    assert graph_block(data) == 32
+
+
+def initializers(data: bytes) -> dict[str, AnyArray]:
+    """The constants of a file, by name."""
+    held = onnx.load_model_from_string(data).graph.initializer
+    return {tensor.name: numpy_helper.to_array(tensor) for tensor in held}
 
 
 def unlike(size: NetworkSize) -> VisionModel:
@@ -144,7 +132,7 @@ def alike(model: VisionModel) -> VisionModel:
 def weight_bytes(model: VisionModel) -> int:
     """Of a file, what its weights take."""
     held = vision_graph(model, 4).graph.initializer
-    return sum(len(tensor.raw_data) for tensor in held if tensor.name.startswith(WEIGHTS))
+    return sum(len(tensor.raw_data) for tensor in held if tensor.name.startswith("networks."))
 
 
 @pytest.mark.parametrize("name", SIZES)
@@ -154,9 +142,7 @@ def test_what_all_networks_have_alike_is_kept_once(name: str) -> None:
     assert sum(array.size for array in kept_weights(model.weights).values()) == len(GRID) * size.parameters
     once = (size.width + size.direction) * size.width + size.width
     assert weight_bytes(model) - weight_bytes(same) == 2 * (len(GRID) - 1) * once
-    back = vision_model(file_of(same))
-    for (key, kept), (_, found) in zip(same.weights.arrays(), back.weights.arrays(), strict=True):
-        assert kept.tobytes() == found.tobytes(), key
+    assert VisionNetworks(file_of(same)).size == size
     query = asked(same, 60, 6)
     density, scattered = evaluate(same, query)
     found_density, found_scattered = by_graph(same, query)
@@ -169,21 +155,18 @@ def test_zeros_of_two_signs_come_back_as_they_were() -> None:
     scatter = np.array(same.weights.scatter)
     scatter[2, scatter_rows(SMALL)["view"]] = -0.0
     signed = VisionModel(GRID, replace(same.weights, scatter=scatter))
-    assert vision_model(file_of(signed)).weights.scatter.tobytes() == scatter.tobytes()
+    view = scatter[:, scatter_rows(SMALL)["view"]]
+    assert initializers(file_of(signed))["networks.scatter.view"].tobytes() == view.tobytes()
 
 
 @pytest.mark.parametrize("name", ["compact", "told"])
 def test_files_with_the_whole_layer_are_read_too(name: str) -> None:
     """As they were written before what is alike was kept once."""
     model = unlike(SIZES[name])
-    held = {f"{WEIGHTS}{key}": array for key, array in kept_weights(model.weights).items()}
-    for part in [key for key in held if "scatter." in key]:
-        held.pop(part)
-    told, count = SIZES[name].extras > 0, len(GRID)
-    held[f"{WEIGHTS}scatter"] = np.array(model.weights.scatter)
-    found = held_weights(held, count, told, SCALE)
-    for (key, kept), (_, back) in zip(model.weights.arrays(), found.arrays(), strict=True):
-        assert kept.tobytes() == back.tobytes(), key
+    graph = vision_graph(model)
+    scatter = np.array(model.weights.scatter)
+    graph.graph.initializer.append(numpy_helper.from_array(scatter, "networks.scatter"))
+    assert VisionNetworks(graph.SerializeToString()).size == SIZES[name]
 
 
 def test_sizes_are_the_papers() -> None:
@@ -206,17 +189,15 @@ def test_the_graph_says_what_plain_float64_says(name: str) -> None:
     np.testing.assert_allclose(found_scattered, scattered, rtol=0, atol=phase(SIZES[name]))
 
 
-@pytest.mark.parametrize("block", [1, LANES, SAMPLES])
+@pytest.mark.parametrize("block", [1, 16, 32])
 @pytest.mark.parametrize("name", SIZES)
-def test_the_kernel_says_what_plain_float64_says(name: str, block: int) -> None:
+def test_points_in_blocks_say_what_plain_float64_says(name: str, block: int) -> None:
     """Of networks that look the same from every side, and of others."""
     drawn = drawn_look(GRID, SIZES[name], SCALE)
-    assert not folded(drawn.weights).looks
-    assert folded(sided(drawn).weights).looks
     for model in (drawn, sided(drawn)):
         query = asked(model, 500, 2)
         density, scattered = evaluate(model, query)
-        found_density, found_scattered = by_kernel(model, query, block)
+        found_density, found_scattered = by_networks(model, query, block)
         np.testing.assert_allclose(found_density, density, rtol=0, atol=phase(SIZES[name]) * density.max())
         np.testing.assert_allclose(found_scattered, scattered, rtol=0, atol=phase(SIZES[name]))
 
@@ -234,7 +215,7 @@ def test_octaves_are_counted_in_the_cell() -> None:
     far = VisionModel(replace(GRID, low=LOW + 25.0), near.weights)
     query = asked(near, 40, 3)
     moved = replace(query, points=query.points + 25.0)
-    for ask in (by_graph, lambda model, what: by_kernel(model, what, SAMPLES)):
+    for ask in (by_graph, by_networks):
         density, scattered = ask(near, query)
         far_density, far_scattered = ask(far, moved)
         # 25 m in float64 is known to 4e-15 m: 7e-13 of a half cell, 4e-10 rad in the tenth octave.
@@ -255,7 +236,7 @@ def test_weights_as_large_as_float16_has_give_finite_numbers() -> None:
     arrays = {name: array + 65504.0 for name, array in no_weights(PAPER, len(GRID)).items()}
     model = VisionModel(GRID, VisionWeights(PAPER, 1.0, **arrays).rounded())
     query = asked(model, 32, 4)
-    for found in (*by_graph(model, query), *by_kernel(model, query, SAMPLES)):
+    for found in (*by_graph(model, query), *by_networks(model, query)):
         assert np.isfinite(found).all()
 
 
@@ -264,9 +245,7 @@ def test_a_light_changes_what_plain_says_it_changes() -> None:
     query = asked(model, 100, 5)
     for light in ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [-0.6, 0.8, 0.0]):
         lit = replace(query, light=np.array(light))
-        np.testing.assert_allclose(
-            by_kernel(model, lit, SAMPLES)[1], evaluate(model, lit)[1], rtol=0, atol=1e-5
-        )
+        np.testing.assert_allclose(by_networks(model, lit)[1], evaluate(model, lit)[1], rtol=0, atol=1e-5)
 
 
 def test_weights_that_do_not_fit_are_refused_by_name() -> None:
@@ -313,7 +292,7 @@ def test_a_size_that_is_none_is_refused(size: dict[str, int]) -> None:
 def test_files_of_something_else_are_refused() -> None:
     data = file_of(even_look(GRID, SCALE, (0.0, 0.0, 0.0)))
     with pytest.raises(DataRefused):
-        vision_model(data[: len(data) // 2])
+        VisionNetworks(data[: len(data) // 2])
     graph = vision_graph(even_look(GRID, SCALE, (0.0, 0.0, 0.0)))
     for tensor in graph.graph.initializer:
         if tensor.name == "cell":
@@ -321,7 +300,7 @@ def test_files_of_something_else_are_refused() -> None:
     for node in graph.graph.node:
         node.input[:] = ["size" if name == "cell" else name for name in node.input]
     with pytest.raises(DataRefused, match="'cell'"):
-        vision_model(graph.SerializeToString())
+        VisionNetworks(graph.SerializeToString())
 
 
 def test_a_point_without_a_network_is_told_apart() -> None:
@@ -333,5 +312,11 @@ def test_a_point_without_a_network_is_told_apart() -> None:
     assert found[0] >= 0
     assert found[1] >= 0, "the greatest corner belongs to the last cell"
     assert (found[2:] == -1).all()
-    with pytest.raises(OutOfDomain, match="-1"):
-        grid.local(points, found)
+
+
+def test_a_point_beside_its_cell_by_rounding_has_its_network() -> None:
+    grid = VisionGrid(np.zeros(3), 1.0, np.array([[1, 0, 0]]))
+    for x, wanted in ((1.0, 0), (1.0 - 1e-7, 0), (2.0, 0), (2.0 + 1e-7, 0), (0.99, -1), (2.01, -1)):
+        assert grid.networks(np.array([[x, 0.5, 0.5]])).tolist() == [wanted]
+    points = np.array([[1.5, 1.0, 1.0], [1.5, 1.1, 1.0], [-5.0, 0.5, 0.5]])
+    assert grid.networks(points).tolist() == [0, -1, -1]

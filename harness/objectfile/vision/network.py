@@ -12,8 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only
-from harness.basics.errors import OutOfDomain, WrongUse
+from harness.basics.arrays import AnyArray, FloatArray, IntArray, read_only
+from harness.basics.compiled import compiled
+from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.mesh import Mesh
 from harness.objectfile.vision_tensors import EXTRAS, MOST_CELLS, Kind
 
 CELLS = 16
@@ -23,8 +25,20 @@ CELLS = 16
 BLOCK = 32
 """Samples of one network that are asked together."""
 
-_BESIDE = 1e-9
-"""Of a cell: how far beside the grid rounding may put its own corners."""
+PER_CELL = 8
+"""Voxels along a cell: the unit of depths that networks learn densities at."""
+
+DEEP = 1.0
+"""Voxels: how far behind the surface networks learn to answer."""
+
+_BESIDE = 1e-6
+"""Of a cell: how far beside its cube rounding may put a point, as where a mesh is written in float32."""
+
+_MOST_LOST = 0.02
+"""Of a surface's points: one that was written in float32 touches some cells that it did not touch before."""
+
+_OUTSIDE = 0.125
+"""Of a cell: how far a surface may leave the grid."""
 
 
 @dataclass(frozen=True)
@@ -162,30 +176,53 @@ class VisionGrid:
         return read_only(table)
 
     def networks(self, points: FloatArray) -> IntArray:
-        """``(n,)`` network of each of ``(n, 3)`` points in m; -1 where none answers.
+        """Find the network of each of ``(n, 3)`` points in m: ``(n,)``, -1 where none answers.
 
-        The greatest corner belongs to the last cube.
+        A point on the border of a cube, or beside it by what rounding does, belongs to either.
         """
-        scaled = (np.asarray(points, np.float64) - self.low) / self.cell
-        inside: BoolArray = np.all((scaled >= -_BESIDE) & (scaled <= self.shape + _BESIDE), axis=1)
-        cube = np.clip(np.where(inside[:, None], scaled, 0.0).astype(np.int64), 0, self.shape - 1)
-        return np.where(inside, self.table[tuple(cube.T)], -1).astype(np.int64)
+        return _networks_of(np.asarray(points, np.float64), self.low, self.cell, self.table)
 
-    def local(self, points: FloatArray, networks: IntArray) -> FloatArray:
-        """``(n, 3)``: the points, -1 to 1 in the cells of their networks, to which they are moved if beside.
+    def require_surface(self, mesh: Mesh) -> None:
+        """Refuse a surface of another object than the networks'.
+
+        Args:
+            mesh: in metres.
 
         Raises:
-            OutOfDomain: a network that there is not.
+            DataRefused: it goes where no network answers.
         """
-        networks = np.asarray(networks)
-        if len(networks) and not (networks.min() >= 0 and networks.max() < len(self)):
-            raise OutOfDomain(
-                f"networks {networks.min()} to {networks.max()} were asked of {len(self)}, counted from 0; "
-                "leave out the points that no network answers (-1)"
+        places = np.concatenate([mesh.vertices, mesh.corners.mean(axis=1)])
+        lost = float(np.mean(self.networks(places) < 0))
+        outside = float(np.maximum(self.low - mesh.bounds[0], mesh.bounds[1] - self.high).max())
+        if lost > _MOST_LOST or outside > _OUTSIDE * self.cell:
+            raise DataRefused(
+                f"{lost:.0%} of the surface's points have no network among {len(self)}, and it leaves the "
+                f"grid by {max(outside, 0.0) * 1e3:.3g} mm; mesh and networks are of different objects, "
+                "build the object again"
             )
-        scaled = (np.asarray(points, np.float64) - self.low) / self.cell - self.cells[networks]
-        clipped: FloatArray = np.clip(2.0 * scaled - 1.0, -1.0, 1.0)
-        return clipped
+
+
+@compiled
+def _networks_of(points: FloatArray, low: FloatArray, cell: float, table: AnyArray) -> IntArray:
+    """See ``VisionGrid.networks``."""
+    found = np.full(len(points), -1, np.int64)
+    x, y, z = table.shape
+    for n in range(len(points)):
+        a, b, c = (
+            (points[n, 0] - low[0]) / cell,
+            (points[n, 1] - low[1]) / cell,
+            (points[n, 2] - low[2]) / cell,
+        )
+        for k in range(9):
+            # The point itself, then the corners of a tiny cube around it.
+            beside = 0.0 if k == 0 else _BESIDE
+            i = int(np.floor(a + (beside if k & 1 else -beside)))
+            j = int(np.floor(b + (beside if k & 2 else -beside)))
+            m = int(np.floor(c + (beside if k & 4 else -beside)))
+            if 0 <= i < x and 0 <= j < y and 0 <= m < z and table[i, j, m] >= 0:
+                found[n] = table[i, j, m]
+                break
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,3 +310,10 @@ class VisionModel:
     def __post_init__(self) -> None:
         if len(self.grid) != len(self.weights):
             raise WrongUse(f"{len(self.grid)} cells and {len(self.weights)} networks; one for each is needed")
+
+
+def scatter_rows(size: NetworkSize) -> dict[str, slice]:
+    """Which rows of ``VisionWeights.scatter`` belong to what."""
+    ends = np.cumsum([0, size.width, size.direction, size.direction, size.extras])
+    names = ("feature", "view", "light", "extras")
+    return {name: slice(int(a), int(b)) for name, a, b in zip(names, ends[:-1], ends[1:], strict=True)}

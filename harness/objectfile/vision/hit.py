@@ -1,20 +1,171 @@
-"""Whether a lamp far away sees places: its rays are parallel, so that faces are looked up on its own plane.
+"""Where rays meet the surface: the point, its normal, and whether a lamp far away is seen from there.
 
-Faces are projected along the light once for a lamp, and listed by square cells of the plane across it. Of the
-faces of one cell those stop a place's light that cover it and are nearer to the lamp.
+The outline of a picture knows which face each ray meets, so that no ray is followed. All rays towards a lamp
+are parallel, so that what is in the light's way is looked up on the plane across it: faces are projected
+along the light once for a lamp, and listed by square cells of that plane. Of the faces of one cell those
+stop a point's light that cover it and are nearer to the lamp.
 
-Light that leaves a place outside of a closed surface and is stopped enters the surface first, through a face
-that looks away from the lamp: such are all that must be listed for it, and few places have one above them. A
-place's own face is one of them if the place was lifted from it: what enters there leaves through another.
+Light that leaves a point outside of a closed surface and is stopped enters the surface first, through a face
+that looks away from the lamp: such are all that must be listed for it, and few points have one above them. A
+point's own face is one of them if the point was lifted from it: what enters there leaves through another.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from harness.basics.compiled import compiled
+from harness.basics.faces.ray_mesh import LEAST
+from harness.basics.faces.ray_triangle import triangles_of
 from harness.basics.mesh import Mesh
+from harness.objectfile.vision.coverage import Contours, Outline
+from harness.picture.pinhole import DirectionalLight, Pinhole
+from harness.sim.light.appearance import plain
+from harness.sim.light.lambert_kernels import cosine_of, place_on
+
+Surface = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+"""Triangles as ``triangles_of`` has them, ``(m, 3, 3)`` m corners, ``(m, 3)`` unit normals of faces, and
+``(m, 3, 3)`` of their corners."""
+
+
+Eye = tuple[FloatArray, float, float, float, FloatArray]
+"""A camera's place ``(3,)`` m, its focal length and axis x and y in pixels, and its rotation ``(3, 3)``."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePoints:
+    """The points of a surface that rays meet, one a ray.
+
+    Attributes:
+        points: ``(n, 3)`` m, object frame.
+        views: ``(n, 3)`` float32 unit, from the camera.
+        light: ``(3,)`` float32 unit, towards the lamp.
+        extras: ``(n, 4)`` float32: 1 where the lamp is seen, else 0; the unit normal on the side seen.
+    """
+
+    points: FloatArray
+    views: AnyArray
+    light: AnyArray
+    extras: AnyArray
+
+
+class HitSurface:
+    """A mesh whose points are looked up for one picture after another.
+
+    Args:
+        contours: of the mesh.
+    """
+
+    def __init__(self, contours: Contours) -> None:
+        mesh = contours.mesh
+        self._mesh, self._closed = mesh, contours.closed
+        normals = plain(mesh, (1.0, 1.0, 1.0)).normals
+        self._surface: Surface = (triangles_of(mesh.corners), mesh.corners, mesh.face_normals, normals)
+        self._grid: LampGrid | None = None
+
+    def points(self, camera: Pinhole, light: DirectionalLight, outline: Outline) -> SurfacePoints:
+        """Find the points that an outline shows, one for each of its pixels.
+
+        Args:
+            camera: that looks.
+            light: from far away.
+            outline: of this mesh, in the camera's picture.
+        """
+        count = len(outline.faces)
+        points, lifted, cosine = np.empty((count, 3)), np.empty((count, 3)), np.empty(count)
+        views, extras = np.empty((count, 3), np.float32), np.empty((count, 4), np.float32)
+        rotation = np.ascontiguousarray(camera.object_from_camera[:3, :3])
+        eye: Eye = (camera.eye, camera.focal_px, *camera.centre_px, rotation)
+        lamp, size = np.array(light.direction, np.float64), self._mesh.diagonal
+        _find_points(
+            outline.places,
+            outline.faces,
+            eye,
+            self._surface,
+            lamp,
+            size,
+            points,
+            views,
+            lifted,
+            cosine,
+            extras,
+        )
+        extras[:, 0] = self._listed(lamp, camera.eye).sees(lifted, LEAST * size, outline.faces, cosine)
+        return SurfacePoints(points, views, lamp.astype(np.float32), extras)
+
+    def _listed(self, lamp: FloatArray, eye: FloatArray) -> "LampGrid":
+        """List the faces as a lamp sees them, again if it moved, or the eye from outside of the mesh into it.
+
+        What is seen from outside of a closed surface is seen on its outside.
+        """
+        low, high = self._mesh.bounds
+        from_outside = self._closed and bool(((eye < low) | (eye > high)).any())
+        kept = self._grid
+        if kept is None or not np.array_equal(kept.turn[:, 2], lamp) or kept.from_outside != from_outside:
+            kept = self._grid = LampGrid.of(self._mesh, lamp, from_outside=from_outside)
+        return kept
+
+
+@compiled
+def _find_points(
+    places: AnyArray,
+    faces: AnyArray,
+    camera: Eye,
+    surface: Surface,
+    lamp: FloatArray,
+    size: float,
+    points: FloatArray,
+    views: AnyArray,
+    lifted: FloatArray,
+    cosine: FloatArray,
+    extras: AnyArray,
+) -> None:
+    """Fill in the points of ``SurfacePoints``, and all of ``extras`` but whether the lamp is seen.
+
+    Args:
+        places: ``(n, 2)`` x and y in the picture, pixels.
+        faces: ``(n,)`` which face is in front there.
+        camera: that looks.
+        surface: of the mesh.
+        lamp: ``(3,)`` unit, towards it.
+        size: m, of the mesh.
+        points: ``(n, 3)`` m, written.
+        views: ``(n, 3)`` unit, written.
+        lifted: ``(n, 3)`` m, written: from where the lamp is looked for.
+        cosine: ``(n,)`` written: between normal and lamp, 0 where a point looks away.
+        extras: ``(n, 4)``, of which the last three are written.
+    """
+    eye, focal, x, y, rotation = camera
+    triangles, corners, flats, normals = surface
+    light = (lamp[0], lamp[1], lamp[2])
+    for n in range(len(places)):
+        f, a, b = faces[n], (places[n, 0] - x) / focal, (places[n, 1] - y) / focal
+        unit = 1.0 / math.sqrt(a * a + b * b + 1.0)
+        dx = unit * (rotation[0, 0] * a + rotation[0, 1] * b + rotation[0, 2])
+        dy = unit * (rotation[1, 0] * a + rotation[1, 1] * b + rotation[1, 2])
+        dz = unit * (rotation[2, 0] * a + rotation[2, 1] * b + rotation[2, 2])
+        # The line of the ray and the face's plane, after Moeller and Trumbore. A ray on an edge passes by its
+        # face by what rounding has done to its place, and is moved to it.
+        px = dy * triangles[f, 2, 2] - dz * triangles[f, 2, 1]
+        py = dz * triangles[f, 2, 0] - dx * triangles[f, 2, 2]
+        pz = dx * triangles[f, 2, 1] - dy * triangles[f, 2, 0]
+        volume = triangles[f, 1, 0] * px + triangles[f, 1, 1] * py + triangles[f, 1, 2] * pz
+        share = 1.0 / volume if volume != 0.0 else 0.0
+        sx, sy, sz = eye[0] - triangles[f, 0, 0], eye[1] - triangles[f, 0, 1], eye[2] - triangles[f, 0, 2]
+        qx = sy * triangles[f, 1, 2] - sz * triangles[f, 1, 1]
+        qy = sz * triangles[f, 1, 0] - sx * triangles[f, 1, 2]
+        qz = sx * triangles[f, 1, 1] - sy * triangles[f, 1, 0]
+        u = min(max((sx * px + sy * py + sz * pz) * share, 0.0), 1.0)
+        v = min(max((dx * qx + dy * qy + dz * qz) * share, 0.0), 1.0 - u)
+        point, facing, flat, above = place_on(f, u, v, (dx, dy, dz), corners, flats, normals)
+        cosine[n] = cosine_of(light, point, facing, flat, above, size)
+        points[n, 0], points[n, 1], points[n, 2] = point
+        views[n, 0], views[n, 1], views[n, 2] = dx, dy, dz
+        lifted[n, 0], lifted[n, 1], lifted[n, 2] = above
+        extras[n, 1], extras[n, 2], extras[n, 3] = facing
+
 
 _ON_EDGE = 1e-9
 """Share of a face by which it is widened, as in ``ray_kernels``."""
@@ -109,19 +260,18 @@ class LampGrid:
             *(self.turned, self.faces),
         )
 
-    def sees(
-        self, places: FloatArray, least: float, own: IntArray, faced: FloatArray, seen: BoolArray
-    ) -> None:
-        """Fill in whether nothing is between places and the lamp, of those that face it.
+    def sees(self, places: FloatArray, least: float, own: IntArray, faced: FloatArray) -> BoolArray:
+        """Find where nothing is between places and the lamp, of those that face it: ``(n,)``.
 
         Args:
             places: ``(n, 3)`` m.
             least: m, how much nearer to the lamp anything must be.
-            own: ``(n,)`` face that each is on, which does not stop it; -1 where there is no place.
+            own: ``(n,)`` face that each is on, which does not stop it.
             faced: ``(n,)`` cosine, 0 where a place looks away.
-            seen: ``(n,)`` written.
         """
+        seen = np.empty(len(places), np.bool_)
         _sees(places, least, own, faced, self.from_outside, self.lists, seen)
+        return seen
 
 
 def _across(lamp: FloatArray) -> FloatArray:
@@ -227,7 +377,7 @@ def _sees(
     turn, low, cell, columns, starts, most, listed, tops, turned, faces = lists
     rows, share = len(most) // columns, 1.0 / cell
     for n in range(len(places)):
-        seen[n] = own[n] >= 0 and faced[n] > 0.0
+        seen[n] = faced[n] > 0.0
         if not seen[n]:
             continue
         a, b, c = places[n, 0], places[n, 1], places[n, 2]

@@ -1,24 +1,32 @@
 """Which pixels a mesh covers: rays through the same places say so too."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from harness.basics.arrays import AnyArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.mesh import Mesh
-from harness.objectfile.vision.coverage.outline import centre_out, drawn_outline, is_closed, mesh_outline
-from harness.objectfile.vision.threads import Crew, Workspace
+from harness.objectfile.vision.coverage import Contours, Outline, centre_out, is_closed, mesh_outline
 from harness.objects.household import build
 from harness.picture.pinhole import Pinhole
 from tests.oracles.plain_look import looking
 from tests.oracles.seen_shapes import cuboid, square
 
 MUG = build("mug", 8e-3)
+INSIDE = np.array([0.01, 0.013, 0.021])
+
+
+def outline_of(mesh: Mesh, camera: Pinhole, side: int, closed: bool) -> Outline:
+    """By a mesh that is closed, or taken for open."""
+    contours = Contours.of(mesh)
+    return mesh_outline(replace(contours, closed=closed and contours.closed), camera, side)
 
 
 def outlined(mesh: Mesh, camera: Pinhole, side: int, closed: bool = False) -> tuple[AnyArray, AnyArray]:
     """Cover and depth of every pixel."""
-    found = mesh_outline(mesh, closed, camera, side, Crew(1), Workspace())
+    found = outline_of(mesh, camera, side, closed)
     cover, depth = np.zeros(camera.pixels), np.zeros(camera.pixels)
     cover[found.pixels], depth[found.pixels] = found.cover, found.depth
     return cover, depth
@@ -67,7 +75,7 @@ def test_cover_of_a_square_is_its_area(side: int) -> None:
 def test_a_pixel_half_covered_looks_where_it_is() -> None:
     mesh, side = square(0.1), 5
     camera = Pinhole.looking_at((0, 0, 0.4), (0, 0, 0), (0, 1, 0), 41, 41, np.radians(31.0))
-    found = mesh_outline(mesh, False, camera, side, Crew(1), Workspace())
+    found = outline_of(mesh, camera, side, False)
     met = RayMesh(mesh).first_hits(camera.eye, camera.directions_at(found.places.astype(np.float64))).face
     assert (met >= 0).all()
     partly = (found.cover > 0.0) & (found.cover < 1.0)
@@ -75,19 +83,6 @@ def test_a_pixel_half_covered_looks_where_it_is() -> None:
     middle = np.stack([found.pixels % 41 + 0.5, found.pixels // 41 + 0.5], axis=1)
     assert np.abs(found.places - middle).max() <= 0.5
     np.testing.assert_allclose(found.places[~partly], middle[~partly], atol=1e-5)
-
-
-@pytest.mark.parametrize("closed", [False, True])
-def test_more_threads_see_what_one_sees(closed: bool) -> None:
-    """Each draws some of the faces: twice the same mesh, so that every place is as near in two of them."""
-    twice = Mesh(MUG.vertices, np.concatenate([MUG.faces, MUG.faces]))
-    camera = looking(MUG, 1.5, 33, 47)
-    for mesh in (MUG, twice):
-        one, *more = (mesh_outline(mesh, closed, camera, 3, Crew(n), Workspace(), True) for n in (1, 2, 3))
-        assert (one.faces < len(MUG.faces)).all()
-        for found in more:
-            for kind in ("pixels", "cover", "places", "depth", "faces"):
-                np.testing.assert_array_equal(getattr(one, kind), getattr(found, kind))
 
 
 def soup() -> Mesh:
@@ -107,21 +102,40 @@ def turned_about() -> Mesh:
 @pytest.mark.parametrize(
     "mesh", [MUG, turned_about(), soup(), square(0.1)], ids=["mug", "open", "soup", "square"]
 )
-def test_going_around_says_what_every_face_drawn_says(mesh: Mesh, side: int) -> None:
+def test_going_around_says_what_a_ray_through_every_sub_pixel_says(mesh: Mesh, side: int) -> None:
     """Pixels, cover, places, depth and faces; on an edge either of two sub-pixels or faces is right."""
     closed, middle = is_closed(mesh), mesh.bounds.mean(axis=0)
-    for away, width in ((np.array([0.4, 0.5, 0.3]), 90), (np.array([0.0, 0.1, 2.0]), 31)):
+    # Far, near, and within the object, of which a part is behind the camera.
+    for away, width in ((np.array([0.4, 0.5, 0.3]), 90), (np.array([0.0, 0.1, 2.0]), 31), (INSIDE, 33)):
         camera = Pinhole.looking_at(middle + away, middle, (0, 1, 0), width, 40, 12.0 / (width + 40))
-        one = mesh_outline(mesh, closed, camera, side, Crew(1), Workspace(), True)
-        other = drawn_outline(mesh, closed, camera, side, Crew(1), Workspace(), True)
+        one, other = outline_of(mesh, camera, side, closed), _by_rays(mesh, camera, side)
         assert len(one.pixels) > 50
-        assert len(np.setxor1d(one.pixels, other.pixels)) <= 1
+        assert len(np.setxor1d(one.pixels, other.pixels)) <= 2
         _, a, b = np.intersect1d(one.pixels, other.pixels, return_indices=True)
         assert np.count_nonzero(one.cover[a] != other.cover[b]) <= 2
         same = (one.places[a] == other.places[b]).all(axis=1)
         assert np.count_nonzero(~same) <= 2
         np.testing.assert_allclose(one.depth[a][same], other.depth[b][same], rtol=3e-6)
         assert np.count_nonzero(one.faces[a] != other.faces[b]) <= 0.005 * len(a) + 2
+
+
+def _by_rays(mesh: Mesh, camera: Pinhole, side: int) -> Outline:
+    fine = camera.resized(side * camera.width, side * camera.height)
+    ways = fine.directions().reshape(-1, 3)
+    hits = RayMesh(mesh).first_hits(camera.eye, ways)
+
+    def by_pixel(values: AnyArray) -> AnyArray:
+        blocks = values.reshape(camera.height, side, camera.width, side).swapaxes(1, 2)
+        return blocks.reshape(-1, side, side)[:, *centre_out(side).T]
+
+    met, depth = by_pixel(hits.face >= 0), by_pixel(hits.distance * (ways @ camera.forward))
+    pixels = np.flatnonzero(met.any(axis=1))
+    at = met[pixels].argmax(axis=1)
+    i, j = np.divmod(pixels, camera.width)
+    places = np.stack([j, i], axis=1) + 0.5 + (centre_out(side)[at][:, ::-1] - side // 2) / side
+    cover = met[pixels].mean(axis=1).astype(np.float32)
+    faces = by_pixel(hits.face)[pixels, at].astype(np.int32)
+    return Outline(pixels, cover, places.astype(np.float32), depth[pixels, at].astype(np.float32), faces)
 
 
 def test_what_is_behind_the_camera_is_not_seen() -> None:
