@@ -48,8 +48,8 @@ _WEIGHTS = "networks."
 
 _NEEDED = ("low", "cell", "cells", "density_scale")
 
-_AT_ONCE = 1024
-"""Blocks in a run of the graph, so that a large picture takes no more memory than a small one."""
+_AT_ONCE = 128
+"""Blocks in a run of the graph: what it computes between then stays in a cache."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,16 +18,14 @@ import numpy as np
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from harness.basics.compiled import compiled
 from harness.basics.faces.ray_mesh import LEAST
-from harness.basics.faces.ray_triangle import triangles_of
 from harness.basics.mesh import Mesh
 from harness.objectfile.vision.coverage import Contours, Outline
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import plain
 from harness.sim.light.lambert_kernels import cosine_of, place_on
 
-Surface = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
-"""Triangles as ``triangles_of`` has them, ``(m, 3, 3)`` m corners, ``(m, 3)`` unit normals of faces, and
-``(m, 3, 3)`` of their corners."""
+Surface = tuple[FloatArray, FloatArray, FloatArray]
+"""``(m, 3, 3)`` m corners, ``(m, 3)`` unit normals of faces, and ``(m, 3, 3)`` of their corners."""
 
 
 Eye = tuple[FloatArray, float, float, float, FloatArray]
@@ -62,7 +60,7 @@ class HitSurface:
         mesh = contours.mesh
         self._mesh, self._closed = mesh, contours.closed
         normals = plain(mesh, (1.0, 1.0, 1.0)).normals
-        self._surface: Surface = (triangles_of(mesh.corners), mesh.corners, mesh.face_normals, normals)
+        self._surface: Surface = (mesh.corners, mesh.face_normals, normals)
         self._grid: LampGrid | None = None
 
     def points(self, camera: Pinhole, light: DirectionalLight, outline: Outline) -> SurfacePoints:
@@ -138,7 +136,7 @@ def _find_points(
         extras: ``(n, 4)``, of which the last three are written.
     """
     eye, focal, x, y, rotation = camera
-    triangles, corners, flats, normals = surface
+    corners, flats, normals = surface
     light = (lamp[0], lamp[1], lamp[2])
     for n in range(len(places)):
         f, a, b = faces[n], (places[n, 0] - x) / focal, (places[n, 1] - y) / focal
@@ -148,15 +146,14 @@ def _find_points(
         dz = unit * (rotation[2, 0] * a + rotation[2, 1] * b + rotation[2, 2])
         # The line of the ray and the face's plane, after Moeller and Trumbore. A ray on an edge passes by its
         # face by what rounding has done to its place, and is moved to it.
-        px = dy * triangles[f, 2, 2] - dz * triangles[f, 2, 1]
-        py = dz * triangles[f, 2, 0] - dx * triangles[f, 2, 2]
-        pz = dx * triangles[f, 2, 1] - dy * triangles[f, 2, 0]
-        volume = triangles[f, 1, 0] * px + triangles[f, 1, 1] * py + triangles[f, 1, 2] * pz
+        ox, oy, oz = corners[f, 0, 0], corners[f, 0, 1], corners[f, 0, 2]
+        ax, ay, az = corners[f, 1, 0] - ox, corners[f, 1, 1] - oy, corners[f, 1, 2] - oz
+        bx, by, bz = corners[f, 2, 0] - ox, corners[f, 2, 1] - oy, corners[f, 2, 2] - oz
+        px, py, pz = dy * bz - dz * by, dz * bx - dx * bz, dx * by - dy * bx
+        volume = ax * px + ay * py + az * pz
         share = 1.0 / volume if volume != 0.0 else 0.0
-        sx, sy, sz = eye[0] - triangles[f, 0, 0], eye[1] - triangles[f, 0, 1], eye[2] - triangles[f, 0, 2]
-        qx = sy * triangles[f, 1, 2] - sz * triangles[f, 1, 1]
-        qy = sz * triangles[f, 1, 0] - sx * triangles[f, 1, 2]
-        qz = sx * triangles[f, 1, 1] - sy * triangles[f, 1, 0]
+        sx, sy, sz = eye[0] - ox, eye[1] - oy, eye[2] - oz
+        qx, qy, qz = sy * az - sz * ay, sz * ax - sx * az, sx * ay - sy * ax
         u = min(max((sx * px + sy * py + sz * pz) * share, 0.0), 1.0)
         v = min(max((dx * qx + dy * qy + dz * qz) * share, 0.0), 1.0 - u)
         point, facing, flat, above = place_on(f, u, v, (dx, dy, dz), corners, flats, normals)
