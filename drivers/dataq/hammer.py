@@ -12,9 +12,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from drivers.dataq.link import DataqLink, find_port
+from drivers.dataq.link import (
+    DIVIDEND,
+    MODEL,
+    MODELS,
+    SERIAL,
+    DataqLink,
+    divisor,
+    find_port,
+    packet_exponent,
+)
 from drivers.dataq.monitor import REST_WINDOW, Rests
-from drivers.dataq.protocol import DIVIDEND, MODEL, SERIAL, divisor, known_model, packet_exponent
 from drivers.dataq.stream import Position, ScanStream
 from harness.basics.arrays import AnyArray
 from harness.basics.clock import now
@@ -60,7 +68,9 @@ class DataqHammer:
     ) -> None:
         if not port and not serial:
             raise WrongUse(f"{name}: name the box's port or its serial number in the station")
-        self._model = known_model(model)
+        if model not in MODELS:
+            raise WrongUse(f"no acquisition box {model!r} is known; there is {', '.join(MODELS)}")
+        self._model = MODELS[model]
         if calibration.full_scale_counts != self._model.full_scale:
             raise WrongUse(
                 f"{name}: the calibration is of a converter with full scale {calibration.full_scale_counts}; "

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.dataq.protocol import BoxModel, counts, likely_loss
+from drivers.dataq.link import BoxModel, counts, likely_loss
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.bench.clock_fit import ArrivalClock, ClockFit
 

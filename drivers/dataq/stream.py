@@ -1,16 +1,21 @@
 """The stream of a scanning DATAQ box: a thread that fetches, keeps, watches and, where it must, restarts."""
 
 import contextlib
+import os
+import select
+import subprocess
+import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
-from drivers.dataq.fetcher import Arrival, Fetcher
-from drivers.dataq.link import DataqLink, LinkCut
+from drivers.dataq.fetch_child import CUT, EMPTIED, HEADER
+from drivers.dataq.link import MODEL, START, STOP, BoxModel, DataqLink, LinkCut, counts, without_start_echo
 from drivers.dataq.monitor import Rests, StreamMonitor
-from drivers.dataq.protocol import MODEL, START, STOP, BoxModel, counts, without_start_echo
+from drivers.ur import pipe
 from harness.basics.arrays import AnyArray, BoolArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
@@ -27,6 +32,23 @@ _LOOK_PERIOD = 5e-3
 _FETCH_TIMEOUT = 0.1
 _NEWS_TIMEOUT = 0.1
 _SETTLE_TIMEOUT = 30.0
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """What the port held at one moment.
+
+    Attributes:
+        time: s on the bench clock.
+        data: bytes; none where none came for a while.
+        emptied: whether nothing more was waiting behind them.
+        cut: why no more can come; empty where more may.
+    """
+
+    time: float
+    data: bytes
+    emptied: bool
+    cut: str
 
 
 @dataclass(frozen=True)
@@ -319,3 +341,71 @@ class ScanStream:
         with self._changed:
             self._dead = reason
             self._changed.notify_all()
+
+
+_READY: Final = 20.0
+_END: Final = 2.0
+_LARGEST: Final = 1 << 20
+
+
+class Fetcher:
+    """A process that empties a port, from now until ``end``.
+
+    Args:
+        port: file descriptor; nobody else may read it meanwhile.
+
+    Raises:
+        BenchFault: the process does not begin.
+    """
+
+    def __init__(self, port: int) -> None:
+        command = [sys.executable, "-m", "drivers.dataq.fetch_child", str(port)]
+        self._process = pipe.start_process(command, (port,))
+        assert self._process.stdout is not None
+        self._out = self._process.stdout.fileno()
+        pipe.prepare_to_write(self._out)  # roomy, and never waited for
+        self._waiting = bytearray()
+        if not self.read(_READY):
+            self.end()
+            raise BenchFault("the process that fetches the box's samples did not begin; see its words above")
+
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        return self._process.pid
+
+    def read(self, timeout: float) -> list[Arrival]:
+        """What has arrived since the last time; waits at most ``timeout`` s for something."""
+        if not select.select([self._out], [], [], timeout)[0]:
+            return []
+        data = os.read(self._out, _LARGEST)
+        if not data:
+            return [Arrival(0.0, b"", False, "the process that fetches its samples ended")]
+        self._waiting += data
+        return list(self._frames())
+
+    def end(self) -> None:
+        """End the process; the port is this program's again."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+        try:
+            self._process.wait(_END)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._process.stdout.close()
+
+    def _frames(self) -> Iterator[Arrival]:
+        start = 0
+        while len(self._waiting) - start >= HEADER.size:
+            time, kind, length = HEADER.unpack_from(self._waiting, start)
+            end = start + HEADER.size + length
+            if len(self._waiting) < end:
+                break
+            data = bytes(self._waiting[start + HEADER.size : end])
+            cut = data.decode("utf-8", "replace") if kind == CUT else ""
+            yield Arrival(time, b"" if cut else data, kind == EMPTIED, cut)
+            start = end
+        del self._waiting[:start]

@@ -16,8 +16,7 @@ import numpy as np
 
 from drivers.ur import paths, pipe, safety
 from drivers.ur import state as ur_state
-from drivers.ur import words as ur_words
-from drivers.ur.process import Alarm, Alarmed, rate_of
+from drivers.ur.process import Alarm, Alarmed
 from drivers.ur.safety import SafetyLimits
 from drivers.ur.session import UrSession
 from harness.basics.arrays import FloatArray
@@ -110,12 +109,13 @@ class UrArm:
     def health(self) -> Health:
         """Rate and drops since opening; the latency is unknown, for the controller's clock is its own."""
         session = self._opened()
-        packet = session.packet()
+        packet, first, count = session.packet(), session.process.first, session.process.count
+        elapsed = 0.0 if first is None else float(packet[0] - first[0])
         model, serial, version = session.controller
         return Health(
             name="arm",
             identity=f"{model} serial {serial}, PolyScope {version}",
-            rate=rate_of(session.process.first, packet, session.process.count),
+            rate=(count - 1) / elapsed if elapsed > 0.0 else 0.0,
             drops=int(packet[pipe.FIELDS["drops"]][0]),
             latency=None,
             detail=ur_state.detail(packet),
@@ -207,7 +207,7 @@ class UrArm:
             raise LimitExceeded(f"tool digital output {index} was asked; the tool has outputs 0 and 1")
         session = self._opened()
         session.ask({"do": "tool_output", "index": index, "on": on}, ANSWER_WITHIN, though_latched=not on)
-        bit = 1 << (ur_words.TOOL_OUTPUT_BIT + index)
+        bit = 1 << (ur_state.TOOL_OUTPUT_BIT + index)
         if not session.comes_true(
             lambda p: bool(int(p[pipe.FIELDS["output_bits"]][0]) & bit) == on, SEEN_WITHIN
         ):
@@ -245,7 +245,9 @@ class UrArm:
         if max(length, turn) <= SETTLED:
             return True
         seconds = safety.trapezoid_seconds(max(length, turn), speed, acceleration)
-        pose, near = ur_state.pose_vector(target), state.joints.tolist()
+        # UR's pose: x, y, z in m and a rotation vector in rad.
+        pose = [*target[:3, 3].tolist(), *vector_from_rotation(target[:3, :3]).tolist()]
+        near = state.joints.tolist()
         details = {"pose": pose, "near": near, "speed": speed, "acceleration": acceleration, **seek}
         return self._perform(session, epoch, what, seconds, details)
 

@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from drivers.ur import dashboard, pipe
-from drivers.ur import words as ur_words
-from drivers.ur.controller_check import ControllerLink, checked_controller
+from drivers.ur import state as ur_state
+from drivers.ur.dashboard import ControllerLink, checked_controller
 from drivers.ur.program_watch import OWN, ProgramWatch, foreign_program_text
-from drivers.ur.rtde_stream import RtdeStream
+from drivers.ur.stream import RtdeStream
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneError
@@ -82,7 +82,7 @@ class Link:
 
     def _note_the_end(self, packet: FloatArray) -> None:
         """When the program ended: a kick that it met hangs in the library, and says nothing of that."""
-        if int(packet[pipe.FIELDS["runtime_state"]][0]) == ur_words.PLAYING:
+        if int(packet[pipe.FIELDS["runtime_state"]][0]) == ur_state.PLAYING:
             self._ended = None
         elif self._ended is None:
             self._ended = float(packet[pipe.FIELDS["time"]][0])
@@ -136,7 +136,7 @@ class Link:
 
     def state_is_older(self) -> bool:
         """Whether the newest state is of before the program ended: it does not say yet what ended it."""
-        return self._newest is None or int(self._newest[pipe.FIELDS["runtime_state"]][0]) == ur_words.PLAYING
+        return self._newest is None or int(self._newest[pipe.FIELDS["runtime_state"]][0]) == ur_state.PLAYING
 
     def zero_force(self) -> None:
         """Take the present reading of the force sensor as zero."""
@@ -180,12 +180,12 @@ class Link:
         safety, state, mode = (
             int(self._newest[pipe.FIELDS[name]][0]) for name in ("safety_bits", "runtime_state", "robot_mode")
         )
-        words = ur_words.safety_words(safety)
+        words = ur_state.safety_words(safety)
         text = (
-            f"the controller says: safety {words}, program {ur_words.RUNTIME_STATES.get(state, 'unknown')}, "
-            f"robot {ur_words.ROBOT_MODES.get(mode, 'unknown')}"
+            f"the controller says: safety {words}, program {ur_state.RUNTIME_STATES.get(state, 'unknown')}, "
+            f"robot {ur_state.ROBOT_MODES.get(mode, 'unknown')}"
         )
-        if words not in ur_words.MAY_MOVE:
+        if words not in ur_state.MAY_MOVE:
             return ProtectiveStop(text)
         return BenchFault(text + self._who_ended_it(state))
 
@@ -198,8 +198,8 @@ class Link:
                 f"; this computer was too busy: the watchdog waited for {1e3 * silence:.0f} ms (limit "
                 f"{1e3 * self.patience:.0f} ms): close what else runs on it, then open the arm again"
             )
-        if state in ur_words.ENDED:
-            done = "paused" if state in ur_words.PAUSED else "stopped"
+        if state in ur_state.ENDED:
+            done = "paused" if state in ur_state.PAUSED else "stopped"
             return (
                 f"; somebody {done} the program, at the pendant or through the dashboard: ask who, then open "
                 "the arm again"
@@ -259,3 +259,46 @@ class Link:
             )
         cause = self.why()
         return type(cause)(f"the control script does not run on the controller: {cause}")
+
+
+KICK_PERIOD: Final = 0.02  # s; five kicks in the 0.1 s that the watchdog waits at a real bench
+LATE: Final = 0.8  # of the watchdog's patience between two kicks: it may have ended the script
+
+
+class Watchdog:
+    """Kicks for one link, and a memory of the kicks that came late."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._kicked = now()
+        self._late = -LATELY
+        self._script_ran = True
+        self.bit = False
+
+    def start(self) -> None:
+        """The watchdog has just been armed; the script runs."""
+        self._link.kick()
+        self._kicked = now()
+        self._script_ran = True
+        self.bit = False
+
+    def kick(self) -> None:
+        """Kick, if it is time to."""
+        if now() - self._kicked < KICK_PERIOD:
+            return
+        if self._is_late():
+            self._late = now()
+        self._link.kick()
+        self._kicked = now()
+
+    def look(self) -> None:
+        """Notice the end of the script; ``bit`` tells whether a late kick is to blame.
+
+        A script that ended for any other reason (the stop button at the pendant) stays ended.
+        """
+        ran, self._script_ran = self._script_ran, self._link.program_running()
+        if ran and not self._script_ran:
+            self.bit = self._is_late() or now() - self._late < LATELY
+
+    def _is_late(self) -> bool:
+        return now() - self._kicked > LATE * self._link.patience

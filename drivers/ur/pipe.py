@@ -9,10 +9,12 @@ import json
 import os
 import select
 import struct
+import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from typing import Any, Final
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import IO, Any, Final
 
 import numpy as np
 
@@ -52,6 +54,30 @@ WIDTH: Final = 34
 
 class PipeBroken(Exception):
     """The other end is gone, or has not read for so long that the pipe is full."""
+
+
+def start_process(
+    command: Sequence[str], keep: Sequence[int], errors: IO[bytes] | None = None
+) -> subprocess.Popen[bytes]:
+    """Start a program of this checkout in a session of its own, with pipes to its input and from its output.
+
+    Args:
+        command: as for ``subprocess``.
+        keep: file descriptors that stay open in it.
+        errors: file for what it writes to standard error; None for this program's own.
+    """
+    environment = dict(os.environ)
+    root = str(Path(__file__).resolve().parents[2])
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH", "")]))
+    return subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=errors,
+        env=environment,
+        pass_fds=tuple(keep),
+        start_new_session=True,
+    )
 
 
 def message_frame(message: Message) -> bytes:

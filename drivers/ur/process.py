@@ -2,17 +2,13 @@
 
 import contextlib
 import itertools
-import os
 import subprocess
 import tempfile
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import IO, Any, Final
-
-import numpy as np
 
 from drivers.ur import pipe
 from harness.basics.arrays import FloatArray
@@ -71,18 +67,7 @@ class ChildProcess:
             keep: file descriptors that the child holds open too.
         """
         self._said: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the child
-        environment = dict(os.environ)
-        root = str(Path(__file__).resolve().parents[2])
-        environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH", "")]))
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-            env=environment,
-            pass_fds=tuple(keep),
-            start_new_session=True,
-        )
+        self._process = pipe.start_process(command, keep, self._said)
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._to_child = self._process.stdin.fileno()
@@ -237,10 +222,3 @@ class ChildProcess:
             if lines:
                 return "the arm's process ended: " + " / ".join(line.strip() for line in lines[-LAST_LINES:])
         return "the arm's process ended without a word (killed, or crashed in ur_rtde)"
-
-
-def rate_of(first: FloatArray | None, newest: FloatArray | None, count: int) -> float:
-    """Packets a second, measured by arrival; 0 before two packets."""
-    if first is None or newest is None or newest[0] <= first[0]:
-        return 0.0
-    return float((count - 1) / (np.float64(newest[0]) - first[0]))

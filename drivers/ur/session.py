@@ -2,20 +2,22 @@
 
 import contextlib
 import os
+import re
 import socket
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from drivers.ur import dashboard, pipe
-from drivers.ur import lock as arm_lock
 from drivers.ur.link import PATIENCE
 from drivers.ur.process import Alarm, ChildLost, ChildProcess, DeadlineMissed
 from drivers.ur.safety import require_loopback, require_mock
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault, ProtectiveStop, TouchstoneError
+from harness.basics.files.lock_file import read_owner, remove_unheld, take_lock
 from harness.basics.starvation import WATCH, name_cause
 
 PORTS: Final = {30004: "RTDE", 29999: "dashboard", 30003: "script", 30011: "message"}
@@ -52,7 +54,7 @@ class UrSession:
         self.latched: TouchstoneError | None = None
         self.epoch = 0
         self._closing = False
-        self._lock = arm_lock.take(address, lock_folder)
+        self._lock = take_arm(address, lock_folder)
         self._process: ChildProcess | None = None
         try:
             for port, name in PORTS.items():
@@ -215,3 +217,40 @@ def _require_port(address: str, port: int, name: str) -> None:
             f"no arm controller at {address}: its {name} port {port} does not answer ({error}); check the "
             "network cable of the control box, that the box is on, and the address in the station file"
         ) from error
+
+
+_PREFIX, _SUFFIX = "touchstone-arm-", ".lock"
+
+_ATTEMPTS = 10
+"""Attempts at a lock: other programs hold it for moments, to find out whether it is free."""
+
+
+def lock_path(address: str, folder: Path | None = None) -> Path:
+    """The lock file of the arm at ``address``; shared by all users of this computer."""
+    name = re.sub(r"[^0-9A-Za-z.]", "-", address)
+    return (folder or Path(tempfile.gettempdir())) / f"{_PREFIX}{name}{_SUFFIX}"
+
+
+def take_arm(address: str, folder: Path | None = None) -> int:
+    """Take the lock of an arm; the descriptor holds it until it is closed, here and in any child given it.
+
+    The lock files of programs that ended, or were killed, are removed first.
+
+    Raises:
+        BenchFault: another program owns this arm.
+    """
+    path = lock_path(address, folder)
+    remove_ownerless(path.parent)
+    descriptor = take_lock(path, _ATTEMPTS)
+    if descriptor is None:
+        raise BenchFault(
+            f"the arm at {address} is owned by another program ({read_owner(path)}, lock {path}); "
+            "two programs must not drive one arm: end that one first"
+        )
+    return descriptor
+
+
+def remove_ownerless(folder: Path) -> None:
+    """Remove this user's lock files that no living process holds."""
+    for path in folder.glob(f"{_PREFIX}*{_SUFFIX}"):
+        remove_unheld(path)

@@ -5,25 +5,18 @@ from typing import Final
 import numpy as np
 
 from drivers.ur import pipe
-from drivers.ur import words as ur_words
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault
 from harness.basics.geometry import (
     quaternion_from_rotation,
     rotation_from_vector,
     transform,
-    vector_from_rotation,
 )
 from harness.bench import kinematics
 from harness.bench.device import ArmState
 from harness.bench.reading import Channel, Reading
 
 SAME_POSE: Final = 5e-3  # m between the model's flange and the controller's
-
-
-def pose_vector(base_from_flange: FloatArray) -> list[float]:
-    """UR's (x, y, z, rx, ry, rz) of a ``(4, 4)`` pose: metres and a rotation vector in rad."""
-    return [*base_from_flange[:3, 3].tolist(), *vector_from_rotation(base_from_flange[:3, :3]).tolist()]
 
 
 def pose_quaternion(pose: FloatArray) -> FloatArray:
@@ -41,7 +34,7 @@ def arm_state(packet: FloatArray) -> ArmState:
         joint_speeds=packet[fields["joint_speeds"]],
         base_from_flange=transform(rotation_from_vector(pose[3:]), pose[:3]),
         wrench=packet[fields["wrench"]],
-        safety=ur_words.safety_words(int(packet[fields["safety_bits"]][0])),
+        safety=safety_words(int(packet[fields["safety_bits"]][0])),
         moving=bool(packet[fields["moving"]][0]),
     )
 
@@ -90,7 +83,7 @@ def not_switched(index: int, on: bool) -> BenchFault:
 
 def detail(packet: FloatArray) -> str:
     """Safety state and anything unusual since opening, in words."""
-    words = ur_words.safety_words(int(packet[pipe.FIELDS["safety_bits"]][0]))
+    words = safety_words(int(packet[pipe.FIELDS["safety_bits"]][0]))
     restarts = int(packet[pipe.FIELDS["restarts"]][0])
     late = f"; the control script was restarted {restarts} times after a delay at rest" if restarts else ""
     return f"safety {words}{late}"
@@ -100,7 +93,7 @@ def stopped_by_controller(packet: FloatArray, during: str) -> str:
     """What an operator must know of a stop that only they may release."""
     x, y, z = 1e3 * packet[pipe.FIELDS["pose"]][:3]
     fx, fy, fz = packet[pipe.FIELDS["wrench"]][:3]
-    words = ur_words.safety_words(int(packet[pipe.FIELDS["safety_bits"]][0]))
+    words = safety_words(int(packet[pipe.FIELDS["safety_bits"]][0]))
     return (
         f"the controller stopped the arm {during}: {words}; flange at ({x:.1f}, {y:.1f}, {z:.1f}) mm in "
         f"base, force ({fx:.1f}, {fy:.1f}, {fz:.1f}) N. Look for the cause, free the arm and release the "
@@ -118,3 +111,49 @@ def require_model(model: str, address: str, state: ArmState) -> None:
             f"{address} says it is (limit {1e3 * SAME_POSE:g} mm): the station file names another model, or "
             "the controller keeps a tool offset"
         )
+
+
+ROBOT_MODES: Final = {
+    -1: "no controller",
+    0: "disconnected",
+    1: "confirm safety",
+    2: "booting",
+    3: "power off",
+    4: "power on",
+    5: "idle",
+    6: "backdrive",
+    7: "running",
+    8: "updating firmware",
+}
+RUNTIME_STATES: Final = {
+    0: "stopping",
+    1: "stopped",
+    2: "playing",
+    3: "pausing",
+    4: "paused",
+    5: "resuming",
+}
+RUNNING: Final = 7
+PLAYING: Final = 2
+PAUSED: Final = frozenset({3, 4})
+ENDED: Final = frozenset({0, 1, 3, 4})
+TOOL_OUTPUT_BIT: Final = 16
+
+_SAFETY: Final = (
+    (1 << 5 | 1 << 6 | 1 << 7, "emergency stop"),
+    (1 << 9, "fault"),
+    (1 << 8, "violation"),
+    (1 << 2, "protective stop"),
+    (1 << 11, "three-position switch released"),
+    (1 << 4, "safeguard stop"),
+    (1 << 10, "stopped due to safety"),
+    (1 << 3, "recovery"),
+    (1 << 1, "reduced"),
+    (1 << 0, "normal"),
+)
+MAY_MOVE: Final = frozenset({"normal", "reduced"})
+
+
+def safety_words(bits: int) -> str:
+    """The gravest state among the controller's safety status bits, in words."""
+    return next((words for mask, words in _SAFETY if bits & mask), f"unknown (bits {bits:#x})")

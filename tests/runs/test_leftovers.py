@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.ur import lock as arm_lock
+from drivers.ur.session import lock_path, remove_ownerless, take_arm
 from harness.basics.errors import BenchFault
 from harness.basics.files import lock_file
 from harness.basics.files.owned_folder import OwnedFolder
@@ -17,12 +17,12 @@ ADDRESS = "127.9.8.7"
 OWNER = """
 import sys, time
 from pathlib import Path
-from drivers.ur import lock as arm_lock
+from drivers.ur.session import take_arm
 from harness.basics.files.owned_folder import OwnedFolder
 parent = Path(sys.argv[1])
 folder = OwnedFolder("touchstone-lab-", parent)
 (folder.path / "lab.log").write_text("ready")
-lock = arm_lock.take(sys.argv[2], parent)
+lock = take_arm(sys.argv[2], parent)
 print(folder.path, flush=True)
 time.sleep(600)
 """
@@ -87,25 +87,25 @@ def test_what_is_not_a_held_folder_stays(tmp_path: Path) -> None:
 def test_a_lock_keeps_others_out_until_its_owner_is_killed(owner: tuple[Path, Kill], tmp_path: Path) -> None:
     _, kill = owner
     with pytest.raises(BenchFault, match=r"owned by another program \(process \d+, lock .*127\.9\.8\.7"):
-        arm_lock.take(ADDRESS, tmp_path)
+        take_arm(ADDRESS, tmp_path)
     kill()
-    descriptor = arm_lock.take(ADDRESS, tmp_path)
+    descriptor = take_arm(ADDRESS, tmp_path)
     with pytest.raises(BenchFault, match="owned by another program"):
-        arm_lock.take(ADDRESS, tmp_path)
+        take_arm(ADDRESS, tmp_path)
     os.close(descriptor)
-    os.close(arm_lock.take(ADDRESS, tmp_path))
+    os.close(take_arm(ADDRESS, tmp_path))
 
 
 def test_lock_files_of_the_dead_are_removed_and_those_of_the_living_stay(
     owner: tuple[Path, Kill], tmp_path: Path
 ) -> None:
     _, kill = owner
-    arm_lock.remove_ownerless(tmp_path)
-    assert arm_lock.lock_path(ADDRESS, tmp_path).exists()
+    remove_ownerless(tmp_path)
+    assert lock_path(ADDRESS, tmp_path).exists()
     kill()
-    assert arm_lock.lock_path(ADDRESS, tmp_path).exists()
-    other = arm_lock.lock_path("127.9.8.6", tmp_path)
-    descriptor = arm_lock.take("127.9.8.6", tmp_path)
+    assert lock_path(ADDRESS, tmp_path).exists()
+    other = lock_path("127.9.8.6", tmp_path)
+    descriptor = take_arm("127.9.8.6", tmp_path)
     os.close(descriptor)
     assert sorted(tmp_path.glob("*.lock")) == [other]
 
@@ -113,7 +113,7 @@ def test_lock_files_of_the_dead_are_removed_and_those_of_the_living_stay(
 def test_a_lock_taken_while_its_file_is_removed_is_taken_on_the_new_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = arm_lock.lock_path(ADDRESS, tmp_path)
+    path = lock_path(ADDRESS, tmp_path)
     locked, left = lock_file._lock, [path]
 
     def locked_once_removed(descriptor: int) -> bool:
@@ -122,7 +122,7 @@ def test_a_lock_taken_while_its_file_is_removed_is_taken_on_the_new_file(
         return locked(descriptor)
 
     monkeypatch.setattr(lock_file, "_lock", locked_once_removed)
-    descriptor = arm_lock.take(ADDRESS, tmp_path)
+    descriptor = take_arm(ADDRESS, tmp_path)
     with pytest.raises(BenchFault, match="owned by another program"):
-        arm_lock.take(ADDRESS, tmp_path)
+        take_arm(ADDRESS, tmp_path)
     os.close(descriptor)

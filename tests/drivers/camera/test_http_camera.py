@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from drivers.camera.http_camera import HttpCamera, gelsight, scene_camera
-from drivers.camera.mjpeg import MjpegStream
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
@@ -207,8 +206,8 @@ def test_pictures_of_a_grey_camera_are_refused_of_a_gel_and_named_of_a_scene() -
     for jpeg in (single.tobytes(), encode(np.repeat(grey[..., None], 3, axis=2))):
         scene = stream()
         assert scene._decode(jpeg) is not None
-        assert "without colour" in scene.detail
-        gel = MjpegStream("gel", "http://127.0.0.1:1", scene.channel, colour=True)
+        assert "without colour" in scene.health().detail
+        gel = HttpCamera("gel", "http://127.0.0.1:1", scene.channel, "", colour=True)
         with pytest.raises(BenchFault, match=r"gel: .* without colour"):
             gel._decode(jpeg)
         gel._decode(lit())
@@ -245,13 +244,13 @@ def test_the_scene_camera_reads_the_same_way(bench: Bench) -> None:
     assert reading.values.shape == (2, 12, 16, 3)
 
 
-def stream() -> MjpegStream:
+def stream() -> HttpCamera:
     """A stream that no thread fills."""
     channel = Channel("gel.image", "count", (120, 160, 3), "uint8")
-    return MjpegStream("the camera", "http://127.0.0.1:1", channel)
+    return HttpCamera("the camera", "http://127.0.0.1:1", channel, "")
 
 
-def frames_at(camera: MjpegStream, times: Iterable[float], jpeg: bytes = b"\xff\xd8\xff\xd9") -> None:
+def frames_at(camera: HttpCamera, times: Iterable[float], jpeg: bytes = b"\xff\xd8\xff\xd9") -> None:
     for at in times:
         camera._keep(at, jpeg)
 
@@ -330,8 +329,8 @@ class Connections:
 
 def test_the_time_without_a_connection_is_no_part_of_the_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     link = Connections(6, 3)
-    monkeypatch.setattr("drivers.camera.mjpeg.now", link.now)
-    monkeypatch.setattr("drivers.camera.mjpeg._capture", link.connect)
+    monkeypatch.setattr("drivers.camera.http_camera.now", link.now)
+    monkeypatch.setattr("drivers.camera.http_camera._capture", link.connect)
     link.camera._drain(link.connect())
     assert len(link.camera._frames) == 9
     assert link.camera.rate == pytest.approx(25.0)

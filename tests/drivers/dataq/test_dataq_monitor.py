@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivers.dataq.link import MODELS
 from drivers.dataq.monitor import PROMPT, STEADY, STEADY_COUNT, Rests, StreamMonitor
-from drivers.dataq.protocol import MODELS
 from harness.basics.arrays import AnyArray
 
 RATE = 50e3

@@ -5,18 +5,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.dataq.protocol import (
+from drivers.dataq.hammer import DataqHammer
+from drivers.dataq.link import (
     MODELS,
     answer_to,
     counts,
     divisor,
-    known_model,
     likely_loss,
     packet_exponent,
     without_start_echo,
 )
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import WrongUse
+from tests.support.daq_bench import CALIBRATION
 
 OFFSETS = np.array([120.0, -180.0])
 
@@ -77,7 +78,7 @@ def test_what_may_become_an_echo_is_waited_for(begun: bytes) -> None:
 
 def test_an_unknown_model_is_named_with_those_there_are() -> None:
     with pytest.raises(WrongUse, match=r"DI-1110, DI-2108"):
-        known_model("DI-9999")
+        DataqHammer(CALIBRATION, port="/dev/ttyACM0", model="DI-9999")
 
 
 def quiet(seed: int, model: str) -> AnyArray:

@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 
 from drivers.ur import pipe
-from drivers.ur.state import pose_vector
+from harness.basics.geometry import vector_from_rotation
 from harness.bench import kinematics
 
 READY = np.array([0.0, -1.4, 1.7, -1.87, -1.57, 0.0])
 
 
 def packet(joints: np.ndarray, moving: bool, force: float) -> bytes:
-    values = np.zeros(pipe.WIDTH)
+    values, flange = np.zeros(pipe.WIDTH), kinematics.forward("ur5e", joints)
     values[pipe.FIELDS["time"]] = values[pipe.FIELDS["controller_time"]] = time.monotonic()
     values[pipe.FIELDS["joints"]] = joints
-    values[pipe.FIELDS["pose"]] = pose_vector(kinematics.forward("ur5e", joints))
+    values[pipe.FIELDS["pose"]] = [*flange[:3, 3], *vector_from_rotation(flange[:3, :3])]
     values[pipe.FIELDS["wrench"]][2] = force
     values[pipe.FIELDS["safety_bits"]] = 1
     values[pipe.FIELDS["moving"]] = moving

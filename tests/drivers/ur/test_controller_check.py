@@ -5,7 +5,7 @@ from types import ModuleType
 
 import pytest
 
-from drivers.ur.controller_check import checked_controller
+from drivers.ur.dashboard import checked_controller
 from harness.basics.errors import BenchFault, ProtectiveStop
 
 

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from drivers.ur import pipe, rtde_stream
-from drivers.ur.rtde_stream import RtdeStream
+from drivers.ur import pipe, stream
+from drivers.ur.stream import RtdeStream
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault
 
@@ -55,7 +55,7 @@ def serve() -> Iterator[Callable[[Conversation], str]]:
 
     def start(conversation: Conversation) -> str:
         address = next(ADDRESSES)
-        port = socket.create_server((address, rtde_stream.PORT))
+        port = socket.create_server((address, stream.PORT))
 
         def run() -> None:
             link, _ = port.accept()

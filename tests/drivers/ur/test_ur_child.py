@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from drivers.ur import dashboard, pipe
 from drivers.ur import motion as ur_motion
-from drivers.ur import words as ur_words
 from drivers.ur.child import Child
 from drivers.ur.motion import CAUSE_WITHIN, Motion, Outcome
+from drivers.ur.state import safety_words
 from drivers.ur.stream import Guard, Stream
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
@@ -106,7 +106,7 @@ def test_writing_to_a_closed_pipe_says_so() -> None:
     ],
 )
 def test_the_gravest_safety_state_is_the_one_told(bits: int, words: str) -> None:
-    assert ur_words.safety_words(bits) == words
+    assert safety_words(bits) == words
 
 
 def a_packet(clock: float, force: float = 0.0, speed: float = 0.0, bits: int = 1) -> FloatArray:
