@@ -21,14 +21,14 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
 
-from harness.basics.arrays import FloatArray
+from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import TouchstoneError, WrongUse
 from harness.basics.geometry import frame_facing, inverse, transform
@@ -36,7 +36,7 @@ from harness.bench.gap import load_gap
 from harness.bench.kinematics import forward
 from harness.bench.station import BARE, LOOK, PRESS, STRIKE
 from harness.bench.station_sections import ArmSection
-from mocks.camera.lab_cameras import CameraView, stream
+from mocks.camera.gelsight_stream import MjpegServer
 from mocks.faults import parse
 from mocks.lab_processes import CAMERA_PORT, GEL_PORT, ChildPipe, LabChild, free_address, keep_time
 from mocks.lab_scene import read_lab_scene
@@ -44,9 +44,59 @@ from mocks.shared_pose import SharedPose, StepMark
 from mocks.ur.hooks import LEFT_ABOVE, ControllerConfig
 from mocks.ur.serve import serve
 from mocks.world.gap_draw import GapDraw
-from mocks.world.sound_of_run import strikes_of
+from mocks.world.instrument import strikes_of
 from mocks.world.truth import TruthFile
 from mocks.world.world import NominalBench, World
+
+
+class CameraView:
+    """A camera's view of the world at the arm's present pose, step and sample."""
+
+    def __init__(
+        self, shared: SharedPose, viewer: int, look: Callable[[FloatArray, int, int], ByteArray]
+    ) -> None:
+        self._shared = shared
+        self._viewer = viewer
+        self._look = look
+        self._pose = shared.base_from_flange
+        self._mark = shared.mark
+
+    def state(self) -> Hashable:
+        """Pose, step and sample."""
+        self._mark = self._shared.mark
+        self._pose = self._shared.base_from_flange
+        return self._pose.tobytes(), self._mark.step, self._mark.sample
+
+    def picture(self) -> ByteArray:
+        """What the world shows there."""
+        return self._look(self._pose, self._mark.step, self._mark.sample)
+
+    def sent(self) -> None:
+        """Tell the lab which mark has been shown."""
+        self._shared.set_shown(self._viewer, self._mark.number)
+
+
+def stream(address: str, port: int, view: CameraView, rate: float, line: ChildPipe) -> None:
+    """Serve a view as MJPEG until the lab is gone.
+
+    Args:
+        address: loopback.
+        port: of the stream.
+        view: what is to be seen.
+        rate: frames a second.
+        line: to the lab.
+    """
+    server = MjpegServer(address, port, view, rate)
+    line.ready()
+
+    def should_stop() -> bool:
+        fault = line.fault()
+        if fault is not None:
+            server.fault.set(fault)
+        return line.should_stop()
+
+    server.serve(should_stop)
+
 
 if TYPE_CHECKING:
     from mocks.daq.strike_counts import StrikeCounts
@@ -144,8 +194,7 @@ class Lab:
     def _plug_in(self, strikes: "StrikeCounts", card: "tuple[SoundCard, Wire] | None") -> None:
         """Begin the hammer's box: the last child, so that nobody else holds its end of the cable."""
         from mocks.daq.box import DaqBox, Source  # by runs that are to be heard, and by no others
-        from mocks.daq.source import Played
-        from mocks.daq.strike_counts import Striker
+        from mocks.daq.strike_counts import Played, Striker
 
         source: Source
         if card is None:

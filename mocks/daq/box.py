@@ -15,16 +15,145 @@ import pty
 import select
 import tty
 from collections.abc import Callable
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 
 from harness.basics.arrays import AnyArray
 from harness.basics.clock import now
-from mocks.daq.instrument import MODELS, CommandInterpreter
-from mocks.daq.memory import Fifo
 from mocks.faults import ActiveFault, Fault
-from mocks.lab_processes import keep_time
+from mocks.lab_processes import ChildPipe, keep_time
+
+_END = b"\r"
+_LONGEST_COMMAND = 256
+_MAKER = "DATAQ"
+_INPUTS = range(11)  # analogue 0 to 7, counter 8, rate 9, digital word 10
+_INFO_QUESTIONS = range(10)
+
+
+@dataclass(frozen=True)
+class MockedBoxModel:
+    """What one model of the family is.
+
+    Attributes:
+        name: product number, as ``info 1`` states it.
+        bits: of its converter; fewer than 16 leave it left-justified in 16.
+        dividend: Hz; the scan list's rate is this over the divisor of ``srate``.
+        divisors: that ``srate`` takes, least and greatest.
+        decimates: whether it has ``dec`` and ``deca``.
+    """
+
+    name: str
+    bits: int
+    dividend: int
+    divisors: tuple[int, int]
+    decimates: bool
+
+
+MODELS = {
+    "DI-1110": MockedBoxModel("1110", 12, 60_000_000, (375, 65535), decimates=False),
+    "DI-2108": MockedBoxModel("2108", 16, 60_000_000, (375, 65535), decimates=True),
+}
+
+
+class CommandInterpreter:
+    """The command interpreter of an instrument.
+
+    From the maker's "Data Acquisition Instrument Command Protocol" (DATAQ Instruments, revised
+    2019-08-05): commands are lower-case ASCII, arguments separated by one space, ended by a carriage
+    return; each is answered by itself with its value while the instrument is not scanning, and by
+    nothing while it is.
+
+    Args:
+        model: of ``MODELS``.
+        serial: as ``info 6`` states it.
+        echoes_start: whether the echo of ``start`` comes in front of the data; firmwares differ.
+
+    Attributes:
+        scanning: whether samples are being taken.
+        scan_list: inputs, by slot.
+    """
+
+    def __init__(self, model: MockedBoxModel, serial: str, echoes_start: bool = False) -> None:
+        self.scanning = False
+        self.scan_list: list[int] = [0]
+        self._model = model
+        self._serial = serial
+        self._echoes_start = echoes_start
+        self._pending = b""
+        low, high = model.divisors
+        # The commands that set one number: what it may be, and what it is.
+        self._allowed = {"srate": range(low, high + 1), "ps": range(8), "led": range(8), "encode": range(2)}
+        if model.decimates:
+            self._allowed |= {"dec": range(1, 513), "deca": range(4)}
+        self._set = {"srate": high, "ps": 0, "encode": 0, "dec": 1}
+
+    @property
+    def aggregate_rate(self) -> float:
+        """Hz, nominal, of words: over the whole scan list."""
+        return self._model.dividend / self._set["srate"]
+
+    @property
+    def packet(self) -> int:
+        """Bytes that leave at once."""
+        return 1 << (self._set["ps"] + 4)
+
+    @property
+    def as_text(self) -> bool:
+        """Whether samples leave as lines of decimal numbers."""
+        return self._set["encode"] == 1
+
+    @property
+    def decimation(self) -> int:
+        """Scans that are taken for each that leaves; the last of them does, whatever ``deca`` says."""
+        return self._set["dec"]
+
+    def take(self, data: bytes) -> bytes:
+        """Obey what the cable brings; the answers to it."""
+        *commands, self._pending = (self._pending + data).split(_END)
+        self._pending = self._pending[-_LONGEST_COMMAND:]
+        return b"".join(self._answer(command) for command in commands)
+
+    def _answer(self, command: bytes) -> bytes:
+        words = command.decode("ascii", "replace").strip("\0\n ").split(" ")
+        was_scanning = self.scanning
+        value = self._obey(words[0], words[1:])
+        silent = value is None or (was_scanning and words[0] != "stop")
+        if silent or (words[0] == "start" and not self._echoes_start):
+            return b""
+        return f"{' '.join([*words, value] if value else words)}".encode() + _END + b"\0"
+
+    def _obey(self, name: str, arguments: list[str]) -> str | None:
+        """The value in the answer, often empty; None where the command is not answered."""
+        if name == "start" and arguments in ([], ["0"]):
+            self.scanning = True
+            return ""
+        if name == "stop" and not arguments:
+            self.scanning = False
+            return ""
+        if not all(argument.isdigit() for argument in arguments):
+            return None
+        match name, [int(argument) for argument in arguments]:
+            case "info", [question] if question in _INFO_QUESTIONS:
+                model = self._model
+                answers = {0: _MAKER, 1: model.name, 2: "129", 6: self._serial, 9: str(model.dividend)}
+                return answers.get(question, "0")
+            case "slist", [slot, source] if not self.scanning:
+                return self._list(slot, source)
+            case _, [number] if not self.scanning and number in self._allowed.get(name, ()):
+                self._set[name] = number
+                return ""
+        return None
+
+    def _list(self, slot: int, source: int) -> str | None:
+        if source not in _INPUTS or slot > len(self.scan_list):
+            return None
+        self.scan_list = self.scan_list[:slot]
+        if source in self.scan_list:
+            return None
+        self.scan_list.append(source)
+        return ""
+
 
 MEMORY = 4096
 """Bytes of the instrument's own."""
@@ -45,19 +174,6 @@ Input 1 is converted ``1 / aggregate rate`` after input 0 of the same scan: the 
 was at its own moment."""
 
 
-class Cues(Protocol):
-    """What ``mocks.lab_processes.ChildPipe`` is."""
-
-    def ready(self) -> None:
-        """Say that the instrument answers."""
-
-    def fault(self) -> Fault | None:
-        """The next fault to begin."""
-
-    def should_stop(self) -> bool:
-        """Whether the lab is gone."""
-
-
 class DaqBox:
     """One box, from the moment it is plugged in.
 
@@ -65,7 +181,7 @@ class DaqBox:
 
     Args:
         source: what its inputs are at.
-        model: of ``mocks.daq.instrument.MODELS``.
+        model: of ``mocks.daq.box.MODELS``.
         serial: as it states it.
         drift_ppm: how much faster than nominal its crystal runs, parts in a million.
         memory: bytes of its own.
@@ -90,7 +206,8 @@ class DaqBox:
         self._instrument = CommandInterpreter(self._model, serial, echoes_start)
         self._source = source
         self._speed = 1.0 + 1e-6 * drift_ppm
-        self._memory = Fifo(memory)
+        self._memory = bytearray()
+        self._capacity = memory
         self._fault = ActiveFault()
         self._lost = multiprocessing.get_context("fork").Value("q", 0)
         self._began = 0.0
@@ -125,7 +242,7 @@ class DaqBox:
                 os.close(end)
         self._master = self._slave = -1
 
-    def serve(self, line: Cues) -> None:
+    def serve(self, line: ChildPipe) -> None:
         """Be the instrument until the lab is gone or the cable is pulled."""
         keep_time()
         line.ready()
@@ -187,12 +304,13 @@ class DaqBox:
         step = max(1, self._memory_scans() // 2)
         while self._instrument.scanning and self._taken < due:
             count = min(step, due - self._taken)
-            self._memory.push(self._words(count))
+            words, free = self._words(count), self._capacity - len(self._memory)
+            self._memory += words[:free]  # the rest is lost, wherever in a scan that may be
+            self._lost.value += max(0, len(words) - free)
             self._taken += count
             self._numbered += count * self._instrument.decimation
             self._let_out()
         self._let_out()
-        self._lost.value = self._memory.lost
 
     def _memory_scans(self) -> int:
         return MEMORY // (2 * len(self._instrument.scan_list))
@@ -228,8 +346,8 @@ class DaqBox:
         if self._answers and self._instrument.scanning:
             data = b""
         else:
-            data = self._memory.peek(size)[self._losing :]
-            self._memory.drop(size)
+            data = bytes(self._memory[self._losing : size])
+            del self._memory[:size]
             self._losing = 0
         self._host += data + self._answers
         self._answers = b""

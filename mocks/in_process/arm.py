@@ -7,13 +7,40 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import BenchFault, LimitExceeded
-from harness.basics.geometry import quaternion_from_rotation, vector_from_rotation
+from harness.basics.geometry import quaternion_from_rotation, rotation_from_vector, vector_from_rotation
 from harness.bench.device import ArmState, Health
 from harness.bench.kinematics import forward, nearest_branch
 from harness.bench.reading import Channel, Reading
-from mocks.in_process.simulated_motion import Stage, between
-from mocks.ur.arm.profiles import trapezoid
+from mocks.ur.arm.motions import trapezoid
 from mocks.world.world import World
+
+
+@dataclass
+class Stage:
+    """Where a run is in time and in its plan.
+
+    Attributes:
+        time: s on the simulated bench clock.
+        step: of the run; -1 before the first.
+        sample: of the step; -1 before the first.
+    """
+
+    time: float = 0.0
+    step: int = -1
+    sample: int = -1
+
+    def pause(self, seconds: float) -> None:
+        """Let simulated time pass."""
+        self.time += seconds
+
+
+def between(start: FloatArray, goal: FloatArray, turn: FloatArray, share: float) -> FloatArray:
+    """The pose at ``share`` of the way in a straight line, ``turn`` being the whole turn in start's frame."""
+    pose = np.eye(4)
+    pose[:3, :3] = start[:3, :3] @ rotation_from_vector(share * turn)
+    pose[:3, 3] = start[:3, 3] + share * (goal[:3, 3] - start[:3, 3])
+    return goal.copy() if share == 1.0 else pose
+
 
 CYCLE = 2e-3
 """s, the controller's own step: contact is noticed on this grid."""

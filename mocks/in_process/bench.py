@@ -19,12 +19,11 @@ from harness.bench.station import LOOK, PRESS, STRIKE, Bench, RunContext
 from harness.bench.station_file import Station
 from harness.picture.jpeg import decode_jpeg
 from mocks.camera.gelsight_stream import encode
-from mocks.in_process.arm import InProcessArm
-from mocks.in_process.simulated_motion import Stage
+from mocks.in_process.arm import InProcessArm, Stage
 from mocks.lab_scene import nominal_bench
 from mocks.ur.hooks import LEFT_ABOVE
 from mocks.world.gap_draw import GapDraw
-from mocks.world.sound_of_run import strikes_of
+from mocks.world.instrument import strikes_of
 from mocks.world.truth import TruthFile
 from mocks.world.world import World
 
@@ -156,7 +155,7 @@ def _microphone(
     strikes: "StrikeCounts", hammer: "InProcessHammer", station: Station, stage: Stage
 ) -> Microphone:
     from mocks.in_process.microphone import InProcessMicrophone
-    from mocks.sound_card.counts import CardConverter
+    from mocks.sound_card.strike_on_card import CardConverter
 
     section, box = station.own_microphone, station.hammer
     assert section is not None

@@ -20,8 +20,7 @@ from harness.bench.device import Health
 from harness.bench.reading import Channel, Reading
 from harness.bench.station_sections import HammerSection
 from mocks.daq.strike_counts import SKEW, StrikeCounts
-from mocks.in_process.arm import InProcessArm
-from mocks.in_process.simulated_motion import Stage
+from mocks.in_process.arm import InProcessArm, Stage
 
 BLOCK = 500
 """Samples in a recorded block."""

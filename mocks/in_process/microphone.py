@@ -11,9 +11,9 @@ from harness.bench.device import Health
 from harness.bench.microphone_take import CALLBACK, CLOCK, CLOCK_FIELDS, FLAGS, OVERLOAD
 from harness.bench.reading import Channel, Reading
 from harness.bench.station_sections import MicrophoneSection
+from mocks.in_process.arm import Stage
 from mocks.in_process.hammer import Fired, InProcessHammer
-from mocks.in_process.simulated_motion import Stage
-from mocks.sound_card.counts import CardConverter
+from mocks.sound_card.strike_on_card import CardConverter
 from mocks.world.sound import WorldSound
 
 BLOCK = 512

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterable
 from typing import Final
 
-from mocks.ur.connection import Connection
 from mocks.ur.controller import Controller
 from mocks.ur.hooks import Cue
+from mocks.ur.ports import Connection
 from mocks.ur.rtde_server import RtdeServer
 
 KINDS: Final = (
@@ -60,7 +60,7 @@ class Faults:
             case "drop":
                 self._drop(cue.seconds)
             case "freeze":
-                self._rtde.frozen = True
+                self._rtde.freeze(True)
                 self._last(cue.seconds)
             case "local_control" | "remote_control":
                 controller.robot.remote = cue.kind == "remote_control"
@@ -92,7 +92,7 @@ class Faults:
         self._until = None if seconds is None else self._controller.robot.time + seconds
 
     def _clear(self) -> None:
-        self._rtde.frozen = False
+        self._rtde.freeze(False)
         self._rtde.refusing = False
         self._controller.robot.force.broken = False
         self._until = None

@@ -1,15 +1,178 @@
 """Everything a program, a client or the dashboard can read or set of one arm."""
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from enum import IntEnum
+from typing import Any, Final
 
 from mocks.ur.arm.force_sensor import ForceSensor
 from mocks.ur.arm.kinematics import arm_model
 from mocks.ur.arm.mover import Mover
 from mocks.ur.hooks import ControllerConfig
-from mocks.ur.registers import Bank, Outputs, RegisterWatchdog
-from mocks.ur.safety import Safety
+
+UNLOCK_AFTER: Final = 5.0
+"""s from a protective stop to when it may be unlocked."""
+
+FORCE_LIMIT: Final = 150.0
+"""N at the tool; a setting of the safety configuration on a real controller."""
+
+
+class RobotMode(IntEnum):
+    """Power and brakes."""
+
+    POWER_OFF = 3
+    IDLE = 5
+    RUNNING = 7
+
+
+class SafetyMode(IntEnum):
+    """What the safety system does."""
+
+    NORMAL = 1
+    PROTECTIVE_STOP = 3
+    ROBOT_EMERGENCY_STOP = 7
+
+
+_BITS: Final = {
+    SafetyMode.NORMAL: 1 << 0,
+    SafetyMode.PROTECTIVE_STOP: 1 << 2 | 1 << 10,
+    SafetyMode.ROBOT_EMERGENCY_STOP: 1 << 6 | 1 << 7 | 1 << 10,
+}
+
+
+@dataclass
+class Safety:
+    """The safety system's state.
+
+    Attributes:
+        mode: what it does.
+        power: of the arm.
+        button: whether an emergency stop button is pressed.
+        cause: of the last stop, in words.
+        stopped_at: s on the controller's clock.
+    """
+
+    mode: SafetyMode = SafetyMode.NORMAL
+    power: RobotMode = RobotMode.RUNNING
+    button: bool = False
+    cause: str = ""
+    stopped_at: float = 0.0
+
+    @property
+    def bits(self) -> int:
+        """``safety_status_bits``."""
+        return _BITS[self.mode]
+
+    @property
+    def may_move(self) -> bool:
+        """Whether a program may move the arm."""
+        return self.mode is SafetyMode.NORMAL and self.power is RobotMode.RUNNING
+
+    def protective_stop(self, cause: str, time: float) -> bool:
+        """Latch one; False where the arm is stopped already."""
+        if self.mode is not SafetyMode.NORMAL:
+            return False
+        self.mode, self.cause, self.stopped_at = SafetyMode.PROTECTIVE_STOP, cause, time
+        return True
+
+    def emergency_stop(self, time: float) -> None:
+        """The button is pressed: power goes."""
+        self.mode, self.cause, self.stopped_at = SafetyMode.ROBOT_EMERGENCY_STOP, "emergency stop", time
+        self.power, self.button = RobotMode.POWER_OFF, True
+
+    def release_button(self) -> None:
+        """The button is turned back; the arm stays without power."""
+        if self.button:
+            self.button = False
+            self.mode = SafetyMode.NORMAL
+
+    def may_unlock(self, time: float) -> bool:
+        """Whether the protective stop is old enough."""
+        return time - self.stopped_at >= UNLOCK_AFTER
+
+    def unlock(self) -> None:
+        """End the protective stop."""
+        if self.mode is SafetyMode.PROTECTIVE_STOP:
+            self.mode = SafetyMode.NORMAL
+
+
+NUMERIC: Final = 48
+BITS: Final = 128
+INT32: Final = range(-(2**31), 2**31)
+
+
+@dataclass
+class Bank:
+    """Registers of one direction."""
+
+    ints: list[int] = field(default_factory=lambda: [0] * NUMERIC)
+    doubles: list[float] = field(default_factory=lambda: [0.0] * NUMERIC)
+    bits: list[bool] = field(default_factory=lambda: [False] * BITS)
+
+    def word(self, start: int) -> int:
+        """32 bits as one number, the first lowest."""
+        return sum(1 << i for i, bit in enumerate(self.bits[start : start + 32]) if bit)
+
+    def set_word(self, start: int, value: int) -> None:
+        """Set 32 bits from one number."""
+        self.bits[start : start + 32] = [bool(value >> i & 1) for i in range(32)]
+
+
+@dataclass
+class Outputs:
+    """Digital and analog outputs, and the speed slider.
+
+    Attributes:
+        digital: bits 0 to 7 standard, 8 to 15 configurable, 16 and 17 at the tool.
+        analog: two shares of full scale.
+        analog_types: bit of each: volts rather than current.
+        slider: share of the programmed speed, 0 to 1.
+    """
+
+    digital: int = 0
+    analog: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    analog_types: int = 0
+    slider: float = 1.0
+
+    def apply(self, sent: Mapping[str, Any]) -> None:
+        """What a client sent: of each value, only what its mask names; the rest may be garbage."""
+        for group, shift in _DIGITAL.items():
+            mask = sent.get(f"{group}_mask", 0) << shift
+            self.digital = self.digital & ~mask | sent.get(group, 0) << shift & mask
+        if sent.get("speed_slider_mask", 0):
+            fraction = sent.get("speed_slider_fraction", self.slider)
+            if 0.0 <= fraction <= 1.0:
+                self.slider = fraction
+        mask = sent.get("standard_analog_output_mask", 0)
+        kinds = sent.get("standard_analog_output_type", 0)
+        self.analog_types = self.analog_types & ~mask | kinds & mask
+        for index in (0, 1):
+            if mask >> index & 1:
+                self.analog[index] = sent.get(f"standard_analog_output_{index}", 0.0)
+
+
+_DIGITAL: Final = {
+    "standard_digital_output": 0,
+    "configurable_digital_output": 8,
+    "tool_digital_output": 16,
+}
+
+
+@dataclass(frozen=True)
+class RegisterWatchdog:
+    """An input that a client must keep writing.
+
+    Attributes:
+        variable: name of the input.
+        period: s, the longest between two writes.
+        action: ``"pause"``, ``"stop"`` or ``"ignore"``.
+    """
+
+    variable: str
+    period: float
+    action: str
+
 
 BOOTED: Final = 100.0
 """s on the controller's clock at the start; clients take a clock below 40 s for a booting controller."""

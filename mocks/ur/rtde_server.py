@@ -5,13 +5,86 @@ Recipe numbers are handed out in order for each connection, as ur_rtde takes for
 
 import asyncio
 import struct
+from collections.abc import Iterator
+from enum import IntEnum
 from typing import Any, Final
 
-from mocks.ur import wire
-from mocks.ur.connection import Connection
 from mocks.ur.controller import Controller
+from mocks.ur.ports import Connection
 from mocks.ur.variables import INPUTS, OUTPUTS, InputVariable, Read
-from mocks.ur.wire import BadPacket, Kind, packet
+
+HEADER: Final = struct.Struct(">HB")
+TYPES: Final = {
+    "BOOL": "?",
+    "UINT8": "B",
+    "UINT32": "I",
+    "UINT64": "Q",
+    "INT32": "i",
+    "DOUBLE": "d",
+    "VECTOR3D": "3d",
+    "VECTOR6D": "6d",
+    "VECTOR6INT32": "6i",
+}
+SCALARS: Final = frozenset(("BOOL", "UINT8", "UINT32", "UINT64", "INT32", "DOUBLE"))
+NOT_FOUND: Final = "NOT_FOUND"
+IN_USE: Final = "IN_USE"
+
+
+class Kind(IntEnum):
+    """Packet types: the ASCII codes of V, v, M, U, O, I, S and P."""
+
+    PROTOCOL_VERSION = 86
+    CONTROL_VERSION = 118
+    TEXT = 77
+    DATA = 85
+    SETUP_OUTPUTS = 79
+    SETUP_INPUTS = 73
+    START = 83
+    PAUSE = 80
+
+
+class BadPacket(Exception):
+    """Bytes that cannot be a packet; what follows cannot be told apart."""
+
+
+class Packets:
+    """Cuts a stream into packets."""
+
+    def __init__(self) -> None:
+        self._waiting = b""
+
+    def feed(self, data: bytes) -> Iterator[tuple[int, bytes]]:
+        """(type, payload) of each whole packet.
+
+        Raises:
+            BadPacket: a size below that of the header.
+        """
+        self._waiting += data
+        while len(self._waiting) >= HEADER.size:
+            size, kind = HEADER.unpack_from(self._waiting)
+            if size < HEADER.size:
+                raise BadPacket(f"a packet of {size} bytes")
+            if len(self._waiting) < size:
+                return
+            payload, self._waiting = self._waiting[HEADER.size : size], self._waiting[size:]
+            yield kind, payload
+
+
+def packet(kind: Kind, payload: bytes = b"") -> bytes:
+    """One packet."""
+    return HEADER.pack(HEADER.size + len(payload), kind) + payload
+
+
+def text_message(message: str, level: int = 1) -> bytes:
+    """A text for the client; level 0 exception, 1 error, 2 warning, 3 info."""
+    text, source = message.encode()[:255], b"controller"
+    return packet(Kind.TEXT, bytes((len(text),)) + text + bytes((len(source),)) + source + bytes((level,)))
+
+
+def layout(types: list[str]) -> struct.Struct:
+    """The bytes of values of these types."""
+    return struct.Struct(">" + "".join(TYPES[name] for name in types))
+
 
 CYCLES_PER_SECOND: Final = 500
 PROTOCOL: Final = 2
@@ -31,13 +104,13 @@ class OutputRecipe:
     """What one client is sent, and how often."""
 
     def __init__(self, names: list[str], frequency: float) -> None:
-        self.types = [OUTPUTS[name].type if name in OUTPUTS else wire.NOT_FOUND for name in names]
+        self.types = [OUTPUTS[name].type if name in OUTPUTS else NOT_FOUND for name in names]
         self.frequency = frequency
-        self.valid = bool(names) and wire.NOT_FOUND not in self.types
+        self.valid = bool(names) and NOT_FOUND not in self.types
         self._reads: list[tuple[Read, bool]] = [
-            (OUTPUTS[name].read, OUTPUTS[name].type in wire.SCALARS) for name in names if name in OUTPUTS
+            (OUTPUTS[name].read, OUTPUTS[name].type in SCALARS) for name in names if name in OUTPUTS
         ]
-        self._layout = wire.layout([name for name in self.types if name != wire.NOT_FOUND])
+        self._layout = layout([name for name in self.types if name != NOT_FOUND])
         if self._layout.size > LARGEST_RECIPE:
             raise BadPacket(f"a recipe of {self._layout.size} bytes; {LARGEST_RECIPE} fit a packet")
 
@@ -64,7 +137,7 @@ class InputRecipe:
 
     def __init__(self, names: list[str], inputs: list[InputVariable]) -> None:
         self._fields = list(zip(names, inputs, strict=True))
-        self._layout = wire.layout([field.type for field in inputs])
+        self._layout = layout([field.type for field in inputs])
 
     def apply(self, controller: Controller, payload: bytes) -> None:
         """Write the values of one packet; ``BadPacket`` where it has another length."""
@@ -74,7 +147,7 @@ class InputRecipe:
         robot = controller.robot
         masked: dict[str, Any] = {}
         for name, field in self._fields:
-            value = next(values) if field.type in wire.SCALARS else [next(values) for _ in range(6)]
+            value = next(values) if field.type in SCALARS else [next(values) for _ in range(6)]
             if field.write is None:
                 masked[name] = value
             else:
@@ -96,49 +169,34 @@ class RtdeServer:
         self.controller = controller
         self.claims: dict[str, RtdeConnection] = {}
         self.refusing = False
-        self._connections: list[RtdeConnection] = []
-        self._frozen = False
+        self.connections: set[RtdeConnection] = set()
+        self.frozen = False
 
-    @property
-    def frozen(self) -> bool:
-        """Whether nothing is sent or read."""
-        return self._frozen
-
-    @frozen.setter
-    def frozen(self, value: bool) -> None:
-        if value != self._frozen:
-            self._frozen = value
-            for connection in self._connections:
-                connection.set_reading(not value)
+    def freeze(self, frozen: bool) -> None:
+        """Send and read nothing, or go on."""
+        self.frozen = frozen
+        for connection in self.connections:
+            connection.set_reading(not frozen)
 
     def publish(self) -> None:
         """Send what this cycle owes."""
-        if not self._frozen:
-            for connection in self._connections:
+        if not self.frozen:
+            for connection in self.connections:
                 connection.publish()
 
     def drop(self) -> None:
         """Close every connection."""
-        for connection in list(self._connections):
+        for connection in list(self.connections):
             connection.abort()
-
-    def add(self, connection: "RtdeConnection") -> None:
-        """A client has come."""
-        self._connections.append(connection)
-
-    def remove(self, connection: "RtdeConnection") -> None:
-        """A client has gone; its inputs keep their values and are free again."""
-        self._connections.remove(connection)
-        self.claims = {name: owner for name, owner in self.claims.items() if owner is not connection}
 
 
 class RtdeConnection(Connection):
     """One client."""
 
     def __init__(self, server: RtdeServer) -> None:
-        super().__init__()
+        super().__init__(server.connections)
         self._server = server
-        self._packets = wire.Packets()
+        self._packets = Packets()
         self._output: OutputRecipe | None = None
         self._inputs: dict[int, InputRecipe] = {}
         self._next_input = 1
@@ -148,15 +206,15 @@ class RtdeConnection(Connection):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client has come."""
         super().connection_made(transport)
-        self._server.add(self)
         if self._server.refusing:
             self.abort()
         self.set_reading(not self._server.frozen)
 
     def connection_lost(self, error: Exception | None) -> None:
-        """It has gone."""
+        """It has gone; its inputs keep their values and are free again."""
         super().connection_lost(error)
-        self._server.remove(self)
+        claims = self._server.claims
+        self._server.claims = {name: owner for name, owner in claims.items() if owner is not self}
 
     def set_reading(self, reading: bool) -> None:
         """Take in what the client sends, or leave it in the cable."""
@@ -169,7 +227,7 @@ class RtdeConnection(Connection):
             for kind, payload in self._packets.feed(data):
                 self._answer(kind, payload)
         except BadPacket as error:
-            self.send(wire.text_message(f"{error}; the connection is closed"))
+            self.send(text_message(f"{error}; the connection is closed"))
             self.close()
 
     def publish(self) -> None:
@@ -206,7 +264,7 @@ class RtdeConnection(Connection):
             case Kind.TEXT:
                 pass
             case _:
-                self.send(wire.text_message(f"packet type {kind} is not known"))
+                self.send(text_message(f"packet type {kind} is not known"))
 
     def _set_up_outputs(self, payload: bytes) -> None:
         if self._protocol != PROTOCOL or len(payload) < _FREQUENCY.size:
@@ -214,7 +272,7 @@ class RtdeConnection(Connection):
         (frequency,) = _FREQUENCY.unpack_from(payload)
         names = _names(payload[_FREQUENCY.size :])
         if not 1.0 <= frequency <= CYCLES_PER_SECOND:
-            self.send(wire.text_message(f"frequency {frequency} Hz is not between 1 and {CYCLES_PER_SECOND}"))
+            self.send(text_message(f"frequency {frequency} Hz is not between 1 and {CYCLES_PER_SECOND}"))
             frequency = 0.0
         recipe = OutputRecipe(names, frequency)
         recipe.valid = recipe.valid and frequency > 0.0
@@ -228,13 +286,13 @@ class RtdeConnection(Connection):
         types = []
         for name in names:
             if name not in INPUTS:
-                types.append(wire.NOT_FOUND)
+                types.append(NOT_FOUND)
             elif claims.get(name, self) is not self:
-                types.append(wire.IN_USE)
+                types.append(IN_USE)
             else:
                 types.append(INPUTS[name].type)
         number = 0
-        if names and wire.NOT_FOUND not in types and wire.IN_USE not in types and self._next_input < 256:
+        if names and NOT_FOUND not in types and IN_USE not in types and self._next_input < 256:
             number, self._next_input = self._next_input, self._next_input + 1
             claims.update(dict.fromkeys(names, self))
             self._inputs[number] = InputRecipe(names, [INPUTS[name] for name in names])
@@ -243,15 +301,15 @@ class RtdeConnection(Connection):
     def _take(self, payload: bytes) -> None:
         number = payload[0] if payload else 0
         if number not in self._inputs:
-            self.send(wire.text_message(f"there is no input recipe {number}"))
+            self.send(text_message(f"there is no input recipe {number}"))
             return
         self._inputs[number].apply(self._server.controller, payload[1:])
 
 
 def _names(payload: bytes) -> list[str]:
     """Variable names; ``BadPacket`` where the answer with their types would not fit a packet."""
-    names = wire.names_in(payload)
-    longest = len(names) * (1 + len(wire.NOT_FOUND))
+    names = [name.strip() for name in payload.decode("ascii", "replace").split(",") if name.strip()]
+    longest = len(names) * (1 + len(NOT_FOUND))
     if max(len(payload), longest) > LARGEST_RECIPE:
         raise BadPacket(
             f"a recipe of {len(names)} names; its types, up to {longest} bytes, do not fit a packet"

@@ -26,12 +26,17 @@ from collections.abc import Callable
 from typing import Final
 
 from mocks.ur.controller import Controller
-from mocks.ur.dashboard import Dashboard, DashboardConnection
 from mocks.ur.faults import Faults
 from mocks.ur.hooks import CYCLE, ContactModel, ControllerConfig, Cue, OnCycle, OnOutputs
-from mocks.ur.primary_server import PrimaryConnection, PrimaryServer
+from mocks.ur.ports import (
+    Connection,
+    Dashboard,
+    DashboardConnection,
+    ScriptConnection,
+    ScriptServer,
+    announce_programs,
+)
 from mocks.ur.rtde_server import RtdeConnection, RtdeServer
-from mocks.ur.script_server import ScriptConnection, ScriptServer
 
 DASHBOARD_PORT: Final = 29999
 SCRIPT_PORTS: Final = (30001, 30002, 30003)
@@ -97,16 +102,25 @@ async def _serve(
     on_ready: Callable[[], None],
     answer: Callable[[str], None],
 ) -> None:
-    rtde, scripts, primary = RtdeServer(controller), ScriptServer(controller), PrimaryServer(controller)
-    dashboard, dashboards = Dashboard(controller), set[DashboardConnection]()
-    faults = Faults(controller, rtde, lambda: {*scripts.connections, *primary.connections, *dashboards})
+    rtde, scripts, dashboard = RtdeServer(controller), ScriptServer(controller), Dashboard(controller)
+    dashboards, readers = (
+        set[DashboardConnection](),
+        set[Connection](),
+    )  # of the dashboard and of the primary port
+    announce_programs(controller, readers)
+    faults = Faults(controller, rtde, lambda: {*scripts.connections, *readers, *dashboards})
+
+    async def listen(port: int, protocol: Callable[[], asyncio.Protocol]) -> None:
+        server = await asyncio.get_running_loop().create_server(protocol, controller.robot.config.host, port)
+        stack.callback(server.close)
+
     async with contextlib.AsyncExitStack() as stack:
         stack.push_async_callback(scripts.close)
-        await _listen(stack, controller, DASHBOARD_PORT, lambda: DashboardConnection(dashboard, dashboards))
+        await listen(DASHBOARD_PORT, lambda: DashboardConnection(dashboard, dashboards))
         for port in SCRIPT_PORTS:
-            await _listen(stack, controller, port, lambda: ScriptConnection(scripts))
-        await _listen(stack, controller, RTDE_PORT, lambda: RtdeConnection(rtde))
-        await _listen(stack, controller, PRIMARY_PORT, lambda: PrimaryConnection(primary))
+            await listen(port, lambda: ScriptConnection(scripts))
+        await listen(RTDE_PORT, lambda: RtdeConnection(rtde))
+        await listen(PRIMARY_PORT, lambda: Connection(readers))
         on_ready()
         schedule = _Schedule()
         while schedule.count % _STOP_EVERY or not should_stop():
@@ -116,17 +130,6 @@ async def _serve(
             rtde.publish()
             if schedule.count % _CUES_EVERY == 0 and (cue := cues()) is not None:
                 answer(faults.begin(cue))
-
-
-async def _listen(
-    stack: contextlib.AsyncExitStack,
-    controller: Controller,
-    port: int,
-    protocol: Callable[[], asyncio.Protocol],
-) -> None:
-    loop = asyncio.get_running_loop()
-    server = await loop.create_server(protocol, controller.robot.config.host, port)
-    stack.callback(server.close)
 
 
 class _Schedule:

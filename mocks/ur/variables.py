@@ -9,10 +9,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from mocks.ur.arm import poses
-from mocks.ur.controller import Controller
-from mocks.ur.player import RuntimeState
-from mocks.ur.registers import BITS, NUMERIC
-from mocks.ur.safety import RobotMode
+from mocks.ur.controller import Controller, RuntimeState
+from mocks.ur.robot import BITS, NUMERIC, RobotMode
 
 Read = Callable[[Controller], Any]
 Write = Callable[[Controller, Any], None]
@@ -179,23 +177,9 @@ def _item(registers: Callable[[Controller], list[Any]], index: int) -> Read:
     return lambda controller: registers(controller)[index]
 
 
-def _set_int(index: int) -> Write:
+def _setter(registers: Callable[[Controller], list[Any]], index: int) -> Write:
     def write(controller: Controller, value: Any) -> None:
-        controller.robot.inputs.ints[index] = value
-
-    return write
-
-
-def _set_double(index: int) -> Write:
-    def write(controller: Controller, value: Any) -> None:
-        controller.robot.inputs.doubles[index] = value
-
-    return write
-
-
-def _set_bit(index: int) -> Write:
-    def write(controller: Controller, value: Any) -> None:
-        controller.robot.inputs.bits[index] = value
+        registers(controller)[index] = value
 
     return write
 
@@ -217,9 +201,20 @@ def _inputs() -> dict[str, InputVariable]:
     }
     return {
         **{name: InputVariable(kind, None) for name, kind in masked.items()},
-        **{f"input_int_register_{i}": InputVariable("INT32", _set_int(i)) for i in range(NUMERIC)},
-        **{f"input_double_register_{i}": InputVariable("DOUBLE", _set_double(i)) for i in range(NUMERIC)},
-        **{f"input_bit_register_{i}": InputVariable("BOOL", _set_bit(i)) for i in range(_LAST_WORD, BITS)},
+        **{
+            f"input_int_register_{i}": InputVariable("INT32", _setter(lambda c: c.robot.inputs.ints, i))
+            for i in range(NUMERIC)
+        },
+        **{
+            f"input_double_register_{i}": InputVariable(
+                "DOUBLE", _setter(lambda c: c.robot.inputs.doubles, i)
+            )
+            for i in range(NUMERIC)
+        },
+        **{
+            f"input_bit_register_{i}": InputVariable("BOOL", _setter(lambda c: c.robot.inputs.bits, i))
+            for i in range(_LAST_WORD, BITS)
+        },
         "input_bit_registers0_to_31": InputVariable(
             "UINT32", lambda c, value: c.robot.inputs.set_word(0, value)
         ),

@@ -185,7 +185,7 @@ class GapDraw:
         }
 
     def random(self, purpose: int, *key: int) -> np.random.Generator:
-        """The stream of numbers of one purpose (sound's own are in ``mocks.world.sound_draw``).
+        """The stream of numbers of one purpose (sound's own are in ``mocks.world.sound``).
 
         Args:
             purpose: what the numbers are for.

@@ -19,13 +19,10 @@ from harness.bench.gap import Gap
 from harness.bench.sensor import TactileSensor
 from harness.bench.station import BARE
 from harness.sim.gel.height_map import RasterMesh, depth_image, penetration
-from mocks.camera.picture_grid import PictureGrid
 from mocks.camera.scene_view import Body, SceneView, box
 from mocks.world.gap_draw import GapDraw
-from mocks.world.gel import WorldGel
-from mocks.world.gel_contact import GelContact
-from mocks.world.housing_contact import HousingContact
 from mocks.world.mesh import nearest_face, split_long_edges
+from mocks.world.touch import GelContact, HousingContact, PictureGrid, WorldGel
 
 LONGEST_EDGE = 5.0e-3
 """Metres, in the world's own tessellation: short beside the length over which shape deviates."""

@@ -13,7 +13,7 @@ import pytest
 
 from harness.bench.acquisition import strike_from_readings
 from harness.bench.acquisition_channels import BLOCK, CLOCK, FORCE, PRESSURE
-from mocks.daq.source import Wiring, skewed
+from mocks.daq.strike_counts import Wiring, skewed
 from tests.support.daq_bench import (
     CALIBRATION,
     OFFSETS,

@@ -39,7 +39,7 @@ OF_SOUND = (
     "harness.strikes.spectra",
     "mocks.daq.strike_counts",
     "mocks.world.instrument",
-    "mocks.world.modes",
+    "mocks.world.instrument",
     "mocks.world.sound",
 )
 """Modules of which no function may be called."""

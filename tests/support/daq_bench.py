@@ -11,7 +11,7 @@ from drivers.dataq.hammer import DataqHammer
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.bench.acquisition import AcquisitionCalibration, shipped_acquisition
 from mocks.daq.box import DaqBox, Source
-from mocks.daq.source import Played
+from mocks.daq.strike_counts import Played
 from mocks.faults import Fault
 from mocks.lab_processes import LabChild
 

@@ -5,12 +5,62 @@ Blends are not modelled: every move comes to rest at its goal.
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 from mocks.ur.arm import poses
 from mocks.ur.arm.poses import Vector
-from mocks.ur.arm.profiles import Trapezoid, lasting, trapezoid
 from mocks.ur.hooks import CYCLE, Matrix, Six
+
+
+@dataclass(frozen=True)
+class Trapezoid:
+    """Rest to rest over one unit of way.
+
+    Attributes:
+        duration: s.
+        ramp: s of speeding up, and again of slowing down.
+    """
+
+    duration: float
+    ramp: float
+
+    def share(self, time: float) -> float:
+        """Share of the way done after ``time`` s, 0 to 1; exactly 1 from the end on."""
+        if time >= self.duration:
+            return 1.0
+        peak = 1.0 / (self.duration - self.ramp)
+        if time < self.ramp:
+            return 0.5 * peak * time * time / self.ramp
+        left = self.duration - time
+        if left < self.ramp:
+            return 1.0 - 0.5 * peak * left * left / self.ramp
+        return peak * (time - 0.5 * self.ramp)
+
+
+def trapezoid(length: float, speed: float, acceleration: float) -> Trapezoid:
+    """The fastest at no more than ``speed`` and ``acceleration``; without a cruise where the way is short.
+
+    An infinite acceleration is at full speed all the way.
+    """
+    if length <= 0.0:
+        return Trapezoid(0.0, 0.0)
+    ramp = min(speed / acceleration, math.sqrt(length / acceleration))
+    peak = min(speed, acceleration * ramp) if ramp > 0.0 else speed
+    return Trapezoid(length / peak + ramp, ramp)
+
+
+def lasting(duration: float, ramp_share: float = 0.25) -> Trapezoid:
+    """One that takes a given time, each ramp a share of it."""
+    return Trapezoid(duration, ramp_share * duration)
+
+
+def braking_way(time: float, until: float) -> float:
+    """Way in units of the first speed, ``time`` s into a ramp that ends at rest after ``until`` s."""
+    if time >= until:
+        return 0.5 * until
+    return time * (1.0 - 0.5 * time / until)
+
 
 TURN_LENGTH: Final = 0.1
 """m of way that one radian of turning counts as, for the speed of a line that turns more than it moves."""
@@ -187,3 +237,63 @@ def _approached(present: Sequence[float], target: Sequence[float], step: float) 
     if size <= step:
         return list(target), True
     return [a + step / size * d for a, d in zip(present, change, strict=True)], False
+
+
+_STILL: Final = 1e-9
+"""m/s below which only turning is left to stop."""
+
+
+class StopJoints:
+    """``stopj``: every joint to rest in proportion, the fastest at ``deceleration`` rad/s^2."""
+
+    def __init__(self, deceleration: float) -> None:
+        self._deceleration = deceleration
+        self._start: tuple[Six, Six] | None = None
+        self._until = 0.0
+        self._time = 0.0
+        self.done = False
+
+    def advance(self, body: ArmBody, _seconds: float) -> None:
+        """Move on."""
+        if self._start is None:
+            self._start = body.joints, body.speeds
+            self._until = max(map(abs, body.speeds)) / self._deceleration
+        self._time += CYCLE
+        way = braking_way(self._time, self._until)
+        joints, speeds = self._start
+        body.put_joints(as_six([q + way * speed for q, speed in zip(joints, speeds, strict=True)]))
+        self.done = self._time >= self._until + CYCLE
+
+    def replan(self) -> None:
+        """From the speed the arm has then: none."""
+        self._start, self._time = None, 0.0
+
+
+class StopLine:
+    """``stopl``: the tool centre point to rest along its present velocity."""
+
+    def __init__(self, deceleration: float, turning: float) -> None:
+        self._rates = deceleration, turning
+        self._start: tuple[Matrix, Twist] | None = None
+        self._until = 0.0
+        self._time = 0.0
+        self.done = False
+
+    def advance(self, body: ArmBody, _seconds: float) -> None:
+        """Move on."""
+        if self._start is None:
+            self._start = body.base_from_tcp, body.twist
+            linear, angular = (math.hypot(*part) for part in body.twist)
+            turning = angular / self._rates[1] if linear < _STILL else 0.0
+            self._until = max(linear / self._rates[0], turning)
+        self._time += CYCLE
+        pose, (linear_start, angular_start) = self._start
+        if self._until > 0.0:
+            body.put_tcp(
+                poses.carried(pose, (*linear_start, *angular_start), braking_way(self._time, self._until))
+            )
+        self.done = self._time >= self._until + CYCLE
+
+    def replan(self) -> None:
+        """From the speed the arm has then: none."""
+        self._start, self._time = None, 0.0

@@ -6,8 +6,7 @@ from typing import Final
 
 from mocks.ur.arm import kinematics, poses
 from mocks.ur.arm.kinematics import ArmModel
-from mocks.ur.arm.motions import ArmMotion, Twist
-from mocks.ur.arm.stops import StopJoints
+from mocks.ur.arm.motions import ArmMotion, StopJoints, Twist
 from mocks.ur.hooks import CYCLE, Matrix, Six
 
 PROGRAM_STOP: Final = 10.0

@@ -6,7 +6,7 @@ from collections.abc import Callable, Generator
 from typing import Any, Final
 
 from mocks.ur.urscript import values
-from mocks.ur.urscript.errors import PROGRAM, ScriptError
+from mocks.ur.urscript.values import PROGRAM, ScriptError
 
 Steps = Generator[None, None, Any]
 

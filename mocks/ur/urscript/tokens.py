@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from mocks.ur.urscript.errors import ScriptError
+from mocks.ur.urscript.values import ScriptError
 
 KEYWORDS: Final = frozenset(
     (

@@ -5,7 +5,21 @@ import operator
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
-from mocks.ur.urscript.errors import ScriptError
+PROGRAM: Final = "<URScript>"
+"""The file name of a translated program, in tracebacks."""
+
+
+class ScriptError(Exception):
+    """A program that cannot be read or cannot go on; it stops, as on the pendant.
+
+    Args:
+        message: in words.
+        line: of the text, counted from 1; 0 where it is not known.
+    """
+
+    def __init__(self, message: str, line: int = 0) -> None:
+        super().__init__(f"line {line}: {message}" if line else message)
+
 
 INT32: Final = 2**31
 """Whole numbers from here on become floating-point ones, as whole numbers are 32 bits wide."""

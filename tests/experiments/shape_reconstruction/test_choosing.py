@@ -17,8 +17,7 @@ from harness.basics.geometry import frame_facing, transform, translation
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.builtin import build
-from mocks.world.gel_contact import GelContact
-from mocks.world.housing_contact import HousingContact
+from mocks.world.touch import GelContact, HousingContact
 
 HOUSING = (0.034, 0.030)
 NOTHING = np.zeros((0, 3))

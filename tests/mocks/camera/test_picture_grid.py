@@ -11,8 +11,8 @@ from harness.bench.gap import load_gap
 from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.targets import BALL_RADIUS, ball
 from harness.sim.gel.height_map import RasterMesh, height_maps
-from mocks.camera.picture_grid import PictureGrid
 from mocks.world.gap_draw import GapDraw
+from mocks.world.touch import PictureGrid
 
 DEPTH = 0.8e-3
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mocks.daq.source import Played, Wiring, skewed
+from mocks.daq.strike_counts import Played, Wiring, skewed
 from tests.support.daq_bench import Bench, mocked_box, numbered, numbered_source
 
 pytestmark = pytest.mark.skipif(

@@ -2,8 +2,7 @@
 
 import pytest
 
-from mocks.daq.instrument import MODELS, CommandInterpreter
-from mocks.daq.memory import Fifo
+from mocks.daq.box import MODELS, CommandInterpreter
 
 
 def box(model: str = "DI-2108", echoes_start: bool = False) -> CommandInterpreter:
@@ -97,13 +96,3 @@ def test_the_rate_is_the_dividend_over_the_divisor() -> None:
     instrument = box("DI-1110")
     instrument.take(b"srate 375\r")
     assert instrument.aggregate_rate == 160_000.0
-
-
-def test_what_does_not_fit_is_lost_and_counted() -> None:
-    memory = Fifo(10)
-    memory.push(b"0123456")
-    memory.push(b"abcdef")
-    assert (memory.peek(99), memory.lost) == (b"0123456abc", 3)
-    memory.drop(4)
-    memory.push(b"xy")
-    assert memory.peek(8) == b"456abcxy"

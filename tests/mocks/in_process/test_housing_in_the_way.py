@@ -9,8 +9,7 @@ from harness.bench.gap import load_gap
 from harness.bench.kinematics import nearest_branch
 from harness.bench.station_sections import SafetySection
 from harness.skills.press import ContactMotion, PressPerformer, Speeds
-from mocks.in_process.arm import InProcessArm
-from mocks.in_process.simulated_motion import Stage
+from mocks.in_process.arm import InProcessArm, Stage
 from mocks.ur.hooks import HOME
 from mocks.world.world import NominalBench, World
 

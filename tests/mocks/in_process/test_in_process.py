@@ -14,9 +14,8 @@ from harness.bench.device import Arm, TactileCamera
 from harness.bench.gap import load_gap
 from harness.bench.kinematics import forward, nearest_branch
 from mocks.camera.gelsight_stream import encode
-from mocks.in_process.arm import CYCLE, NOTICED_AFTER, InProcessArm
+from mocks.in_process.arm import CYCLE, NOTICED_AFTER, InProcessArm, Stage
 from mocks.in_process.bench import InProcessCamera
-from mocks.in_process.simulated_motion import Stage
 from mocks.ur.hooks import HOME
 from mocks.world.truth import TruthFile
 from mocks.world.world import NominalBench, World

@@ -13,9 +13,8 @@ from harness.bench.kinematics import nearest_branch
 from harness.bench.reading import Reading
 from harness.bench.station_file import load_station, station_path
 from mocks.daq.strike_counts import StrikeCounts
-from mocks.in_process.arm import InProcessArm
+from mocks.in_process.arm import InProcessArm, Stage
 from mocks.in_process.hammer import BLOCK, InProcessHammer
-from mocks.in_process.simulated_motion import Stage
 from mocks.ur.hooks import HOME
 from mocks.world.world import NominalBench, World
 

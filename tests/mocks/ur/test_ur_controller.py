@@ -6,12 +6,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from mocks.ur.arm.profiles import trapezoid
-from mocks.ur.controller import Controller
-from mocks.ur.dashboard import TOO_EARLY, Dashboard
+from mocks.ur.arm.motions import trapezoid
+from mocks.ur.controller import Controller, RuntimeState
 from mocks.ur.hooks import CYCLE, HOME, ControllerConfig, Six
-from mocks.ur.player import RuntimeState
-from mocks.ur.safety import SafetyMode
+from mocks.ur.ports import TOO_EARLY, Dashboard
+from mocks.ur.robot import SafetyMode
 from tests.support.plane_contact import PlaneContact
 
 CONFIG = ControllerConfig(host="127.0.0.2")

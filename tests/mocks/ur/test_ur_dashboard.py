@@ -3,8 +3,8 @@
 import pytest
 
 from mocks.ur.controller import Controller
-from mocks.ur.dashboard import LOCAL, Dashboard
 from mocks.ur.hooks import ControllerConfig
+from mocks.ur.ports import LOCAL, Dashboard
 
 CONFIG = ControllerConfig(host="127.0.0.2")
 

@@ -8,8 +8,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.geometry import translation
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import GELSIGHT_R15
-from mocks.world.gel_contact import GelContact
-from mocks.world.housing_contact import SPACING, STIFFNESS, HousingContact
+from mocks.world.touch import SPACING, STIFFNESS, GelContact, HousingContact
 
 THICK = GELSIGHT_R15.gel_thickness
 AWAY = 13.5e-3

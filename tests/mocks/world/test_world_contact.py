@@ -11,7 +11,7 @@ from harness.basics.geometry import frame_facing, inverse, transform
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
-from mocks.world.gel_contact import BED_MODULUS, GelContact
+from mocks.world.touch import BED_MODULUS, GelContact
 
 RADIUS = 0.05
 WINDOW = (0.02, 0.015)

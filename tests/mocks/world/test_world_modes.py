@@ -7,7 +7,7 @@ from harness.basics.errors import MeshRefused
 from harness.basics.materials import MATERIALS
 from harness.sim.modal.modal import solve_modes
 from harness.sim.solid.tetrahedra import Tetrahedra, tetrahedra
-from mocks.world.modes import perturbed, smooth_field, uneven
+from mocks.world.instrument import perturbed, smooth_field, uneven
 from tests.oracles.volume_meshes import box
 
 CERAMIC = MATERIALS["ceramic"]

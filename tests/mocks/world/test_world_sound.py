@@ -12,8 +12,7 @@ from harness.bench.acquisition_channels import judge
 from harness.bench.gap import Gap, load_gap
 from harness.sim.modal.modes import Modes
 from mocks.daq.strike_counts import StrikeCounts
-from mocks.world.sound import SoundingObject, WorldSound
-from mocks.world.sound_draw import IMPULSE
+from mocks.world.sound import IMPULSE, SoundingObject, WorldSound
 from mocks.world.world import NominalBench, World
 
 RATE = 50e3
@@ -207,7 +206,7 @@ def test_what_the_gap_says_of_the_modes_is_drawn_about_it(bench: NominalBench) -
 
 def sound_of_draw(seed: int) -> tuple[float, float, float]:
     from mocks.world.gap_draw import GapDraw
-    from mocks.world.sound_draw import SoundDraw
+    from mocks.world.sound import SoundDraw
 
     draw = SoundDraw(GapDraw(load_gap("default"), seed))
     nominal = np.linspace(1e3, 1e4, 30)

@@ -6,11 +6,10 @@ from typing import Any
 
 import pytest
 
-from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.process import LONGEST_TURN, Process
 from mocks.ur.urscript.program import translate
 from mocks.ur.urscript.tokens import whole_length
-from mocks.ur.urscript.values import PoseValue
+from mocks.ur.urscript.values import PoseValue, ScriptError
 
 
 class Bench:

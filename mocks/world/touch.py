@@ -1,15 +1,137 @@
-"""How far an object has come into the gel, and how hard the gel pushes back.
+"""The pixels of a sensor as it was made: their pitch, and that they need not be square."""
 
-The gel is a bed of independent springs (Winkler): pressure is the modulus of the bed times
-the local indentation. A coarse grid suffices for a force, so that the controller can ask for
-it in every cycle; the picture is made elsewhere, on the sensor's own pixels.
-"""
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
+from scipy.ndimage import map_coordinates
 
-from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.arrays import ByteArray, FloatArray, IntArray
+from harness.basics.geometry import translation
 from harness.basics.mesh import Mesh
+from harness.bench.gap import GelGap
+from harness.bench.sensor import TactileSensor
+from harness.sim.gel.gel import R15_SKIRT, GelSkirt, deform, half_kernel, over_range
+from harness.sim.gel.height_map import RasterMesh, height_maps, rest_surface
+from harness.sim.optics.lit_calibration import named_calibration
+from harness.sim.optics.optics import Optics
+from harness.sim.optics.pressed_gel import require_own
+
+_FAR = 0.5e-3
+"""Metres of gap that count as none: the jump from an object's outline to nothing must not ring."""
+
+
+@dataclass(frozen=True)
+class PictureGrid:
+    """Where the pixels of one camera look.
+
+    Attributes:
+        sensor: its pitch is that along the rows: from one column to the next.
+        aspect: pitch from one row to the next over that from one column to the next.
+    """
+
+    sensor: TactileSensor
+    aspect: float = 1.0
+
+    @classmethod
+    def drawn(cls, nominal: TactileSensor, pitch: float, aspect: float) -> "PictureGrid":
+        """A make's sensor whose column pitch is ``pitch`` times the stated one."""
+        return cls(replace(nominal, pitch=nominal.pitch * pitch), aspect)
+
+    @property
+    def mean_pitch(self) -> float:
+        """Metres a pixel, of a square one of the same area."""
+        return float(self.sensor.pitch * np.sqrt(self.aspect))
+
+    def gaps(self, raster: RasterMesh, gel_from_object: FloatArray) -> FloatArray:
+        """``(rows, columns)`` metres, as ``height_maps`` has it; of other than square pixels, by splines.
+
+        Args:
+            raster: the object.
+            gel_from_object: ``(4, 4)`` rigid.
+        """
+        if self.aspect == 1.0:
+            return np.asarray(height_maps(raster, gel_from_object[None], self.sensor)[0])
+        # As many rows more above as below: at an aspect of one the rows are those of the sensor.
+        more = int(np.ceil(0.5 * self.sensor.rows * max(self.aspect - 1.0, 0.0))) + 3
+        tall = replace(self.sensor, rows=self.sensor.rows + 2 * more)
+        square = np.minimum(height_maps(raster, gel_from_object[None], tall)[0], _FAR)
+        rows = (np.arange(self.sensor.rows) + 0.5 - self.sensor.rows / 2) * self.aspect
+        at = np.meshgrid(rows + tall.rows / 2 - 0.5, np.arange(self.sensor.columns), indexing="ij")
+        gap = np.asarray(map_coordinates(square, at, order=3, mode="nearest"), dtype=np.float64)
+        return np.where(gap < 0.5 * _FAR, gap, np.inf)
+
+
+_NARROWEST = 5
+_WIDEST = 301
+
+
+class WorldGel:
+    """From how deep the object reaches into the gel to the picture, at the exact level.
+
+    Args:
+        sensor: make and geometry.
+        gap: how this gel differs from its model.
+        calibration: whose colours it has, a shipped name or a path.
+        steeper: the pitch that colours are stated for over this gel's own: a slope in pixels.
+
+    Attributes:
+        background: ``(rows, columns, 3)``, the picture of the untouched gel.
+        calibration: whose colours this gel has.
+    """
+
+    def __init__(self, sensor: TactileSensor, gap: GelGap, calibration: str, steeper: float = 1.0) -> None:
+        self._sensor = sensor
+        self.calibration = named_calibration(calibration)
+        require_own(self.calibration, sensor)
+        self._steeper = steeper
+        self._skirt = skirt_of(gap.skirt, sensor.pitch)
+        self._optics = Optics(self.calibration, "exact", -rest_surface(sensor))
+        self.background: ByteArray = self.calibration.background
+
+    def picture(self, penetration: FloatArray, gain: float, noise: FloatArray) -> ByteArray:
+        """``(rows, columns, 3)`` uint8, RGB.
+
+        Args:
+            penetration: ``(rows, columns)`` metres, 0 or more.
+            gain: shown indentation over the true one.
+            noise: ``(rows, columns)`` metres, added where the gel is touched.
+        """
+        touched = penetration > 0.0
+        shown = np.where(touched, np.maximum(gain * penetration + noise, 0.0), 0.0)
+        held, _ = over_range(shown[None], self._sensor)
+        deformed = deform(held, self._skirt)
+        if self._steeper != 1.0:
+            deformed = self._steeper * deformed
+        image: ByteArray = self._optics.render(deformed).images[0]
+        return image
+
+
+def skirt_of(blur: float, pitch: float) -> GelSkirt:
+    """Taxim's pyramid of blurs, each half as wide as the one before, that blurs by ``blur`` in all.
+
+    Args:
+        blur: metres, the sigma of all the blurs together.
+        pitch: metres a pixel.
+    """
+    wanted = blur / pitch
+    pyramids = [_pyramid(widest) for widest in range(_NARROWEST, _WIDEST + 1, 2)]
+    best = min(pyramids, key=lambda kernels: abs(_sigma((*kernels, R15_SKIRT.final)) - wanted))
+    return GelSkirt(best, R15_SKIRT.final, R15_SKIRT.core)
+
+
+def _pyramid(widest: int) -> tuple[int, ...]:
+    kernels = [widest]
+    while kernels[-1] // 2 | 1 >= _NARROWEST:
+        kernels.append(kernels[-1] // 2 | 1)
+    return tuple(kernels)
+
+
+def _sigma(kernels: tuple[int, ...]) -> float:
+    """Pixels: variances of blurs in a row add up."""
+    halves = [half_kernel(kernel) for kernel in kernels]
+    return float(np.sqrt(sum(2.0 * np.sum(half * np.arange(len(half)) ** 2) for half in halves)))
+
 
 BED_MODULUS = 1.5e7
 """N/m^3: a soft gel, 37 kPa over 2.5 mm of thickness; 2 mm over the whole window take 9 N."""
@@ -172,3 +294,45 @@ def _rasterize(
                                 pressed = -(u * z[0] + v * z[1] + w * z[2])
                                 if pressed <= reach and pressed > depth[row, column]:
                                     depth[row, column] = pressed
+
+
+STIFFNESS = 1.0e4
+"""N/m of the stand of foam, the sensor's mount and the arm in a row; chosen, not measured."""
+
+SPACING = 1.0e-3
+"""Metres between the places of the face that are looked at: less than the edge of a cup is thick."""
+
+REACH = 10.0e-3
+"""Metres behind the face within which a surface is felt."""
+
+
+class HousingContact:
+    """The flat face of a sensor's housing, a gel's thickness behind the gel's own, against one mesh.
+
+    Its sides are not looked at: on a straight way along the gel's axis nothing meets them first.
+
+    Args:
+        mesh: of the object, in its frame.
+        sensor: the make.
+    """
+
+    def __init__(self, mesh: Mesh, sensor: TactileSensor) -> None:
+        self._face = GelContact(mesh, sensor.housing, SPACING, REACH)
+        self._gel_from_face = translation(np.array([0.0, 0.0, -sensor.gel_thickness]))
+        self._sides = sensor.housing
+
+    def wrench(self, object_from_gel: FloatArray) -> FloatArray:
+        """``(6,)`` N and N m that the object exerts on the face, at the gel's origin, in gel."""
+        depth = self._face.indentation(object_from_gel @ self._gel_from_face)
+        push = STIFFNESS * float(depth.max())
+        if push == 0.0:
+            return np.zeros(6)
+        weights = depth / depth.sum()
+        y, x = (side * _middles(count) for side, count in zip(self._sides[::-1], depth.shape, strict=True))
+        at_x, at_y = float(weights.sum(axis=0) @ x), float(weights.sum(axis=1) @ y)
+        return np.array([0.0, 0.0, -push, -at_y * push, at_x * push, 0.0])
+
+
+def _middles(count: int) -> FloatArray:
+    """``(count,)`` of a side of length one, about its middle."""
+    return (np.arange(count) + 0.5) / count - 0.5
