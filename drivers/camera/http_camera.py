@@ -22,7 +22,7 @@ from harness.bench.device import Health
 from harness.bench.reading import Channel, Reading
 from harness.bench.sensor import TactileSensor
 from harness.bench.station_sections import USB_CAMERA
-from harness.picture.jpeg import decode_jpeg
+from harness.picture.image_file import decode_jpeg
 
 OPEN_TIMEOUT = 2.0
 """s until a host that does not answer, or sends no frame, is given up."""

@@ -18,7 +18,7 @@ from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
 from harness.experiment.lookup import named
 from harness.picture.outline import SeenOutline, corners_of
-from harness.recording.look_pictures import IMAGE
+from harness.recording.observation import IMAGE
 from harness.report.figures.figures import Album
 from harness.report.figures.size import (
     Resonances,

@@ -32,7 +32,7 @@ from harness.experiment.lookup import named
 from harness.experiment.plain import perform_in_process
 from harness.experiment.truth import read_truth
 from harness.picture.outline import SeenOutline
-from harness.recording.look_pictures import look_pictures
+from harness.recording.observation import look_pictures
 from harness.recording.run_folder import RunFiles
 
 TRIVIAL = ("random", "constant", "first peak", "outline's area", "outline's box", "contacts' box")

@@ -13,8 +13,7 @@ from harness.basics.errors import PictureRefused
 from harness.basics.geometry import apply, translation
 from harness.picture.object_mask import mask_by_background
 from harness.picture.square_pixels import aspect_stated
-from harness.recording.look_pictures import look_pictures
-from harness.recording.observation import observe_step, picture_left_out
+from harness.recording.observation import look_pictures, observe_step, picture_left_out
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 from harness.sim.optics.inverse import invert_mean

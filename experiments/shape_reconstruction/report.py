@@ -17,7 +17,7 @@ from harness.bench.device import Health
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
 from harness.experiment.lookup import named
-from harness.recording.look_pictures import IMAGE
+from harness.recording.observation import IMAGE
 from harness.report.figures.figures import Album
 from harness.report.figures.shape import KnownSurface, mask_figure, sections_figure, surface_figure
 from harness.report.figures.shape_strip import SurfaceThen, strip_figure

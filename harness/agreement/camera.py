@@ -23,7 +23,7 @@ from harness.bench.station_sections import CameraSection
 from harness.picture.camera_errors import CameraErrors
 from harness.picture.object_mask import mask_by_background, overlap
 from harness.picture.outline import SeenOutline, corners_of, directions, read_outline
-from harness.recording.look_pictures import look_pictures
+from harness.recording.observation import look_pictures
 
 _UNKNOWNS = 14
 """The object's place (3), rotation (3) and size, the camera's place (3), rotation (3) and focal length."""

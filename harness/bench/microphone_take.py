@@ -35,7 +35,7 @@ BAD = SILENCE_INSERTED | SAMPLES_LOST | OTHER_STATUS | COUNT_BROKEN
 
 UNSURE = 100e-6
 """s, standard deviation of a take's place on the bench clock beyond which it must not be used: what
-`harness.recording.synchronise` finds by the sounds of a run lies within four times this."""
+`harness.recording.observation` finds by the sounds of a run lies within four times this."""
 
 _WORDS = {
     SILENCE_INSERTED: "silence was inserted by the sound library (input underflow)",

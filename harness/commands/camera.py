@@ -35,7 +35,7 @@ def camera(
     import numpy as np
 
     from harness.basics.whole_file import write_bytes_whole
-    from harness.bench.opening.open_each import open_camera, scene_of_all
+    from harness.bench.opening import open_camera, scene_of_all
     from harness.bench.scene import scene_from_options
     from harness.bench.station import RunContext
     from harness.bench.station_file import load_station, station_path

@@ -14,7 +14,7 @@ from harness.commands import options
 from harness.commands.output import ANSWERS, CONSOLE, emit
 
 if TYPE_CHECKING:
-    from harness.bench.opening.instrument_check import Checked
+    from harness.bench.opening import Checked
 
 
 def check(
@@ -28,8 +28,7 @@ def check(
 
     Try: touchstone check --station mock
     """
-    from harness.bench.opening.instrument_check import checked
-    from harness.bench.opening.open_each import open_each, scene_of_all
+    from harness.bench.opening import checked, open_each, scene_of_all
     from harness.bench.station import RunContext
     from harness.bench.station_file import load_station, station_path
     from harness.effects.scene_object import known_object

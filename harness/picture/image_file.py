@@ -1,15 +1,61 @@
 """Pictures on disk, RGB in memory: any file OpenCV reads, and PNG to write."""
 
+from io import BytesIO
 from pathlib import Path
 
 import cv2
 import numpy as np
+from PIL import Image
 
 from harness.basics.arrays import ByteArray, read_only
-from harness.basics.errors import DataRefused
+from harness.basics.errors import DataRefused, TouchstoneError
 from harness.basics.files.foreign_file import read_bounded, refused_as
 from harness.basics.whole_file import write_bytes_whole
-from harness.picture.picture_size import require_modest_picture
+
+MOST_PIXELS = 2**25
+"""Of a picture; the largest cameras of a bench have some 20 million."""
+
+FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "PPM")
+
+
+def require_modest_picture(
+    data: bytes,
+    name: str,
+    refused: type[TouchstoneError] = DataRefused,
+    formats: tuple[str, ...] = FORMATS,
+) -> None:
+    """Refuse the bytes of a picture that are none, or that unpack to more than ``MOST_PIXELS``.
+
+    Args:
+        data: of the file.
+        name: of the picture, for people.
+        refused: the class of what is raised.
+        formats: that are pictures, by their names in Pillow.
+
+    Raises:
+        TouchstoneError: of the class ``refused``.
+    """
+    most = f"a picture has at most {MOST_PIXELS:,}: shrink it"
+    try:
+        with Image.open(BytesIO(data), formats=formats) as head:
+            columns, rows = head.size
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
+        raise refused(f"{name} states far more pixels than a camera has; {most}") from error
+    except Exception as error:
+        raise refused(f"{name} is no picture ({len(data)} bytes); give a PNG or a JPEG") from error
+    if rows * columns > MOST_PIXELS:
+        raise refused(f"{name} states {rows:,} x {columns:,} pixels; {most}")
+
+
+def decode_jpeg(data: bytes, refused: type[TouchstoneError] = DataRefused) -> ByteArray:
+    """``(rows, columns, 3)`` uint8 RGB of a JPEG; an error of the class ``refused`` where it is none."""
+    # EXIF's orientation is not applied to files that are read (``read_image``), so it is not here.
+    kind = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), kind) if data else None
+    if image is None:
+        raise refused(f"an image of {len(data)} bytes is not a JPEG that decodes")
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+
 
 _MOST_BYTES = 2**28
 

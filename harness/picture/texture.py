@@ -8,7 +8,7 @@ from PIL import Image
 
 from harness.basics.arrays import ByteArray, read_only
 from harness.basics.errors import MeshRefused
-from harness.picture.picture_size import FORMATS, require_modest_picture
+from harness.picture.image_file import FORMATS, require_modest_picture
 
 _BY_PILLOW = ("TGA", "GIF")
 """Formats of textures that OpenCV does not read, or not with their palettes."""

@@ -4,16 +4,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from harness.basics.arrays import ByteArray, FloatArray, read_only
 from harness.basics.errors import DataRefused, RecordingDamaged
 from harness.basics.geometry import rotation_from_quaternion, transform
+from harness.basics.resampling import resample
 from harness.bench.acquisition import AcquisitionCalibration, Strike, of_one_stream, strike_from_readings
 from harness.bench.acquisition_channels import FORCE
 from harness.bench.reading import Reading
 from harness.picture.square_pixels import made_square
 from harness.recording.step_file import StepRecord
-from harness.recording.synchronise import synchronised
 
 AROUND_IMAGES = 0.1
 """s before the first frame from which the arm, at rest, is averaged too."""
@@ -111,3 +112,184 @@ def picture_left_out(step: int, why: object) -> str:
         why: the refusal.
     """
     return f"step {step + 1}: its picture is left out: {why}"
+
+
+BARE_IMAGE, IMAGE = "camera.bare", "camera.image"
+"""Channels: the bench without the object, and with it."""
+
+
+def look_pictures(record: StepRecord) -> tuple[ByteArray, ByteArray] | None:
+    """``(rows, columns, 3)`` RGB with the object and without it; None where the step was no look.
+
+    Each is the median of its frames, which has less of the camera's noise.
+    """
+    if IMAGE not in record.readings or BARE_IMAGE not in record.readings:
+        return None
+    return _median(record.readings[IMAGE].values), _median(record.readings[BARE_IMAGE].values)
+
+
+def _median(frames: ByteArray) -> ByteArray:
+    if len(frames) == 3:  # the middle one of each pixel, fifty times as fast as a partition of it
+        a, b, c = np.asarray(frames)
+        return np.asarray(np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c)))
+    return np.asarray(np.median(frames, axis=0)).astype(np.uint8)
+
+
+ComplexArray = npt.NDArray[np.complex128]
+
+REACH = 0.4e-3
+"""s to either side in which a strike is looked for: four times what clocks were seen to wander."""
+
+COHERENT = 0.8
+"""Share of a strike's power in common with the others whose phases one delay must explain."""
+
+UNAMBIGUOUS = 0.05
+"""By which that share must be greater than at any other delay that is not next to it."""
+
+_STEP = 2e-6
+_TRIED = read_only(np.arange(-REACH, REACH + 0.5 * _STEP, _STEP))
+_NEXT = 40e-6
+_ROUNDS = 3
+_DURATION, _BEFORE, _PULSE = 0.3, 1e-3, 4e-3
+_DECAY = 20.0
+_LOWEST = 300.0
+_FLOOR = 0.05
+_SILENT = 1e-300
+
+
+def synchronised(strikes: Sequence[Strike | None]) -> tuple[Strike | None, ...]:
+    """The strikes, those on clocks of their own moved so that their sounds are in time with each other.
+
+    Two instruments' clocks are fitted to the bench clock each for itself, and from strike to strike the
+    fits wander against each other: by microseconds where both state when they sampled, by some 0.1 ms where
+    one is known only by when its samples arrive. A wandering of ``d`` turns the transfer function of a
+    strike by ``2 pi f d``. The strikes themselves tell it: near a resonance the transfer functions of two
+    strikes are in the ratio of two real gains, so that the square of their cross spectrum has no phase
+    of its own but ``4 pi f d``, at all resonances with one ``d``. The signs of the gains, in which the
+    place is, are squared away and stay as they were. What is common to all strikes stays unknown.
+
+    The ratio is not real where two modes share a frequency, as on a body of revolution: there fewer phases
+    fit one delay, another one fits nearly as well, and the strike is marked instead of moved.
+
+    Args:
+        strikes: of one object, heard by one microphone at rest; None where a place was not struck.
+
+    Returns:
+        In order. Strikes on one clock, and those that must not be used anyway, are as they were. One whose
+        place among the others cannot be told is marked lost.
+    """
+    own = [k for k, one in enumerate(strikes) if one is not None and one.opened is not None and not one.fault]
+    if len(own) < 2:
+        return tuple(strikes)
+    chosen = {k: strike for k in own if (strike := strikes[k]) is not None}
+    delays = _delays(list(chosen.values()))
+    moved = {
+        k: _lost(strike) if delay is None else _moved(strike, delay)
+        for (k, strike), delay in zip(chosen.items(), delays, strict=True)
+    }
+    return tuple(moved.get(k, strike) for k, strike in enumerate(strikes))
+
+
+def _delays(strikes: Sequence[Strike]) -> list[float | None]:
+    """Seconds by which each is later than the middle of those whose delay is known; None of the others."""
+    frequencies, transfer = _transfers(strikes)
+    turns = np.exp(4j * np.pi * np.outer(_TRIED, frequencies))
+    known = list(range(len(strikes)))
+    delays = _one_by_one(transfer, frequencies, turns)
+    while len(known) > 1:
+        delays, fits = _together(delays, transfer[known], frequencies, turns)
+        doubt = [_doubt(fit) for fit in fits]
+        worst = int(np.argmax(doubt))
+        if doubt[worst] <= 0.0:
+            middle = float(np.median(delays))
+            found = dict(zip(known, delays, strict=True))
+            return [float(found[k]) - middle if k in found else None for k in range(len(strikes))]
+        del known[worst]
+        delays = np.delete(delays, worst)
+    return [None] * len(strikes)
+
+
+def _one_by_one(transfer: ComplexArray, frequencies: FloatArray, turns: ComplexArray) -> FloatArray:
+    """``(k,)`` s by which each strike fits those before it best: a place to start from."""
+    delays = np.zeros(len(transfer))
+    for k in range(1, len(transfer)):
+        fit = _fit(k, delays[: k + 1], transfer[: k + 1], frequencies, turns)
+        delays[k] = _TRIED[np.argmax(fit)]
+    return delays
+
+
+def _together(
+    start: FloatArray, transfer: ComplexArray, frequencies: FloatArray, turns: ComplexArray
+) -> tuple[FloatArray, FloatArray]:
+    """``(k,)`` s by which each strike fits the others best, and ``(k, d)`` how well for every delay tried."""
+    delays = start - np.median(start)
+    fits = np.zeros((len(transfer), len(_TRIED)))
+    for _ in range(_ROUNDS):
+        for k in range(len(transfer)):
+            fits[k] = _fit(k, delays, transfer, frequencies, turns)
+            delays[k] = _TRIED[np.argmax(fits[k])]
+    return delays, fits
+
+
+def _fit(
+    k: int, delays: FloatArray, transfer: ComplexArray, frequencies: FloatArray, turns: ComplexArray
+) -> FloatArray:
+    """Share of the common power of strike ``k`` and the others in phase, for each delay of ``k`` tried."""
+    squares = np.zeros(len(frequencies), np.complex128)
+    for other in range(len(delays)):
+        if other != k:
+            cross = transfer[k] * np.conj(transfer[other])
+            size = np.abs(cross)
+            # Of length |cross|, and of twice its phase; the other's delay is put right.
+            doubled = cross**2 / np.where(size > 0.0, size, 1.0)
+            squares += doubled * np.exp(-4j * np.pi * frequencies * delays[other])
+    power = sum(
+        float(np.sum(np.abs(transfer[k] * transfer[other]))) for other in range(len(delays)) if other != k
+    )
+    fit: FloatArray = (turns @ squares).real / max(power, _SILENT)
+    return fit
+
+
+def _doubt(fit: FloatArray) -> float:
+    """By how much a delay is too incoherent or ambiguous to be believed; not above zero where it is."""
+    best = int(np.argmax(fit))
+    apart = np.abs(_TRIED - _TRIED[best]) > _NEXT
+    return float(max(COHERENT - fit[best], fit[apart].max() + UNAMBIGUOUS - fit[best]))
+
+
+def _transfers(strikes: Sequence[Strike]) -> tuple[FloatArray, ComplexArray]:
+    """``(f,)`` Hz and ``(k, f)`` pressure over force, each of unit power, 0 where nothing is excited."""
+    rate = float(np.median([strike.rate for strike in strikes]))
+    samples = round(_DURATION * rate)
+    window = np.exp(-_DECAY * np.arange(samples) / rate)
+    frequencies: FloatArray = np.arange(samples + 1) / (2 * samples) * rate
+    found = np.array([_transfer(strike, rate, window, frequencies) for strike in strikes])
+    heard = np.any(found != 0.0, axis=0)
+    return frequencies[heard], found[:, heard]
+
+
+def _transfer(strike: Strike, rate: float, window: FloatArray, frequencies: FloatArray) -> ComplexArray:
+    start = max(0, strike.onset - round(_BEFORE * rate))
+    pulse = start + round((_BEFORE + _PULSE) * rate)
+    force = np.where(np.arange(len(strike.force)) < pulse, strike.force, 0.0)
+    force, pressure = (signal[start : start + len(window)] for signal in (force, strike.pressure))
+    size = 2 * len(window)
+    driven, heard = (np.fft.rfft(signal * window[: len(signal)], size) for signal in (force, pressure))
+    strength = np.abs(driven)
+    excited = (strength > _FLOOR * strength.max()) & (frequencies > _LOWEST)
+    ratio: ComplexArray = np.where(excited, heard / np.where(excited, driven, 1.0), 0.0)
+    return np.asarray(ratio / max(float(np.linalg.norm(ratio)), _SILENT), np.complex128)
+
+
+def _moved(strike: Strike, delay: float) -> Strike:
+    """The strike with its sound ``delay`` s earlier; the ends keep what there is."""
+    last = (len(strike.pressure) - 1) / strike.rate
+    times = np.clip(np.arange(len(strike.pressure)) / strike.rate + delay, 0.0, last)
+    pressure = resample(strike.pressure, 0.0, strike.rate, times, strike.rate)
+    return replace(strike, pressure=read_only(pressure))
+
+
+def _lost(strike: Strike) -> Strike:
+    return replace(
+        strike, lost="its sound cannot be brought into time with that of the other strikes", overload=True
+    )

@@ -5,7 +5,7 @@ from dataclasses import replace
 from harness.basics.errors import WrongUse
 from harness.bench.reading import Reading
 from harness.bench.station import BARE, LOOK, Bench
-from harness.recording.look_pictures import BARE_IMAGE, IMAGE
+from harness.recording.observation import BARE_IMAGE, IMAGE
 from harness.skills.strike import Ask
 
 FRAMES = 3

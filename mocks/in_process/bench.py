@@ -17,7 +17,7 @@ from harness.bench.reading import Channel, Reading
 from harness.bench.scene import SceneFile
 from harness.bench.station import LOOK, PRESS, STRIKE, Bench, RunContext
 from harness.bench.station_file import Station
-from harness.picture.jpeg import decode_jpeg
+from harness.picture.image_file import decode_jpeg
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.arm import InProcessArm, Stage
 from mocks.lab_scene import nominal_bench

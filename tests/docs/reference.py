@@ -15,8 +15,7 @@ from harness.basics.files.json_file import CHECKSUM
 from harness.bench.experiments import EXPERIMENTS, experiment_names, loaded, section_models
 from harness.bench.gap import Gap
 from harness.bench.scene import SceneFile, scene_from_json
-from harness.bench.sensor import MarkerGrid, described_sensor
-from harness.bench.sensor_file import SensorFile
+from harness.bench.sensor import MarkerGrid, SensorFile, described_sensor
 from harness.bench.station_file import Station
 from harness.cli import commands, load
 from harness.effects.accuracy import Knob

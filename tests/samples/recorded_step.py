@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.bench.acquisition_channels import FORCE
 from harness.bench.reading import Channel, Reading
-from harness.picture.jpeg import decode_jpeg
+from harness.picture.image_file import decode_jpeg
 from harness.recording.recording import RunHeader
 from harness.recording.step_file import Step, StepRecord
 

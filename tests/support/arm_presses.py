@@ -14,7 +14,7 @@ from harness.bench.station import Bench
 from harness.bench.station_file import load_station, station_path
 from harness.experiment import begin, perform
 from harness.experiment.perform import Performed
-from harness.picture.jpeg import decode_jpeg
+from harness.picture.image_file import decode_jpeg
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Progress, Quiet

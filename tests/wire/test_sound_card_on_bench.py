@@ -14,12 +14,12 @@ from harness.basics.mesh import Mesh
 from harness.bench.acquisition import Strike
 from harness.bench.acquisition_channels import FORCE, PRESSURE
 from harness.bench.microphone_take import BAD, CALLBACK, CLOCK, FLAGS, UNSURE, take_of
-from harness.bench.opening.instrument_check import rest_levels
+from harness.bench.opening import rest_levels
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import RunContext, open_station
 from harness.bench.station_file import load_station
 from harness.effects.scene_object import known_object
-from harness.recording.synchronise import synchronised
+from harness.recording.observation import synchronised
 from harness.skills.planning import RunPlan
 from mocks.in_process.bench import in_process_bench
 from mocks.sound_card.card import why_not

@@ -20,8 +20,7 @@ from harness.basics.clock import now
 from harness.basics.errors import BenchFault
 from harness.bench.reading import Channel
 from harness.bench.sensor import GELSIGHT_R15
-from harness.picture.image_file import read_image
-from harness.picture.jpeg import decode_jpeg
+from harness.picture.image_file import decode_jpeg, read_image
 from mocks.camera.gelsight_stream import MjpegServer, encode
 from mocks.faults import Fault
 

@@ -21,7 +21,7 @@ from harness.experiment.answer import finish
 from harness.experiment.begin import begin
 from harness.experiment.experiment import Scored
 from harness.objects.household import build
-from harness.recording.look_pictures import BARE_IMAGE, IMAGE
+from harness.recording.observation import BARE_IMAGE, IMAGE
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet

@@ -6,8 +6,15 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from harness.basics.arrays import ByteArray, FloatArray
-from harness.picture.exposure_error import BLOCK, SHADES, Together, group_variance, mistaken_light, together
-from harness.picture.exposure_fit import fit_exposure
+from harness.picture.exposure_fit import (
+    BLOCK,
+    SHADES,
+    Together,
+    fit_exposure,
+    group_variance,
+    mistaken_light,
+    together,
+)
 from harness.picture.srgb import bytes_from_linear
 from tests.samples.exposed_pictures import GAIN, OFFSET, everywhere, shaded
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from harness.basics.arrays import FloatArray
 from harness.bench.acquisition import Strike
-from harness.recording.synchronise import REACH, synchronised
+from harness.recording.observation import REACH, synchronised
 from tests.support.heard_strikes import delay
 
 RATE, ONSET = 50e3, 1000

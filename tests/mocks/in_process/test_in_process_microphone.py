@@ -16,10 +16,10 @@ from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import Bench, RunContext
 from harness.bench.station_file import Station, load_station
 from harness.effects.scene_object import known_object
+from harness.recording.observation import synchronised
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles, create_run, station_acquisition, station_calibration
 from harness.recording.step_file import Step
-from harness.recording.synchronise import synchronised
 from harness.skills.planning import RunPlan
 from harness.strikes.peaks import analyse
 from mocks.in_process.bench import in_process_bench

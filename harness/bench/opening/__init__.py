@@ -1,1 +1,0 @@
-"""Instruments of a bench, each opened by itself."""
