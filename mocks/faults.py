@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.basics.arrays import ByteArray
 from harness.basics.clock import now
 from harness.basics.errors import WrongUse
 from mocks.ur.faults import KINDS as ARM_KINDS
@@ -88,9 +87,3 @@ class ActiveFault:
     def kind(self) -> str:
         """Of the fault now, ``"none"`` where all is well."""
         return self._kind if now() < self._until else "none"
-
-
-def saturated(image: ByteArray) -> ByteArray:
-    """An overexposed ``(rows, columns, 3)`` picture: four times the light, clipped by the sensor."""
-    bright: ByteArray = np.minimum(image.astype(np.uint16) * 4, 255).astype(np.uint8)
-    return bright

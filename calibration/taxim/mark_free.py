@@ -25,7 +25,7 @@ from calibration.taxim.smooth_fit import changes
 from calibration.taxim.table_error import table_error
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import CalibrationRefused
-from harness.picture.square_pixels import stated
+from harness.picture.square_pixels import MADE_SQUARE
 from harness.sim.optics.lit_calibration import LitCalibration, with_shadow
 from harness.sim.optics.tactile_calibration import ColourMisfit, Float32Array, TactileCalibration
 
@@ -277,7 +277,8 @@ def _artefact(
     error: Float32Array,
     misfit: ColourMisfit,
 ) -> LitCalibration:
-    made_from = f"sha256 {pictures.sha256}, {presses} presses without marks{stated(pictures.aspect)}"
+    squared = "" if pictures.aspect == 1.0 else f", {MADE_SQUARE} {pictures.aspect:.6f}"
+    made_from = f"sha256 {pictures.sha256}, {presses} presses without marks{squared}"
     made = calibration_of(pictures.background, model, identity, made_from, error)
     header = replace(
         made.header,

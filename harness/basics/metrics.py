@@ -49,8 +49,3 @@ def median(values: FloatArray) -> FloatArray:
 def mean(values: FloatArray) -> FloatArray:
     """``(k,)`` means of ``(k, n)``."""
     return np.asarray(values.mean(axis=1))
-
-
-def share_above(limit: float) -> Callable[[FloatArray], FloatArray]:
-    """``(k,)`` shares of ``(k, n)`` that lie above ``limit``."""
-    return lambda values: np.asarray((values > limit).mean(axis=1))

@@ -78,9 +78,3 @@ def loaded(reference: str) -> Any:
     """What an import string names: ``"package.module:name"``."""
     module, _, name = reference.partition(":")
     return vars(importlib.import_module(module))[name]
-
-
-def section_models() -> dict[str, str]:
-    """Import strings of the models of a scene file's experiment tables, by the table's name."""
-    rows = EXPERIMENTS.values()
-    return {row.section: row.model for row in rows if row.section is not None and row.model is not None}

@@ -24,7 +24,7 @@ from harness.basics.quantities import (
     Time,
 )
 from harness.basics.toml_file import StrictModel, read_toml, validate
-from harness.bench.experiments import loaded, section_models
+from harness.bench.experiments import EXPERIMENTS, loaded
 from harness.bench.named_files import named_file
 from harness.bench.scene_objectfile import (
     OBJECTFILE,
@@ -387,7 +387,7 @@ def scene_from_json(tree: Any, where: str) -> SceneFile:
 
 def _model_of(tree: Any) -> type[SceneFile]:
     """``SceneFile`` with the tables of experiments that a scene has, so that each is checked by its model."""
-    known = section_models()
+    known = {row.section: row.model for row in EXPERIMENTS.values() if row.section and row.model}
     keys = set(tree) if isinstance(tree, dict) else set()
     strange = keys - set(known) - {field.alias or name for name, field in SceneFile.model_fields.items()}
     # A key that nothing knows is answered with all that there is.

@@ -199,17 +199,6 @@ def sensor_path(make: str, folder: Path | None = None) -> Path:
     return real_path(path)
 
 
-def lasting_make(make: str, folder: Path | None = None) -> str:
-    """What to write of a make: a shipped name, or a path that holds wherever it is read from.
-
-    Raises:
-        WrongUse: as ``described_sensor``.
-    """
-    path = sensor_path(make, folder)
-    _described(path)
-    return make if path.parent == _SHIPPED else str(path)
-
-
 def described_sensor(make: str) -> SensorDescription:
     """A make by its shipped name or the path of its file.
 

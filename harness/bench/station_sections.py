@@ -31,7 +31,8 @@ from harness.bench.sensor import (
     SensorDescription,
     TactileSensor,
     described_sensor,
-    lasting_make,
+    sensor_path,
+    shipped_sensors,
 )
 
 _TURN = 2 * np.pi
@@ -199,7 +200,9 @@ class GelSection(StrictModel):
     @classmethod
     def _is_described(cls, make: str, info: ValidationInfo) -> str:
         try:
-            return lasting_make(make, (info.context or {}).get("folder"))
+            path = str(sensor_path(make, (info.context or {}).get("folder")))
+            described_sensor(path)
+            return make if make in shipped_sensors() else path  # one that holds wherever it is read from
         except WrongUse as error:
             raise ValueError(str(error)) from error
 

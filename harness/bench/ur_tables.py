@@ -54,14 +54,9 @@ def arm_table(model: str) -> ArmTable:
     Raises:
         WrongUse: the model is not one of those here.
     """
-    if model not in _TABLES:
-        raise WrongUse(f"arm model '{model}' is not known; known: {', '.join(sorted(_TABLES))}")
-    return _TABLES[model]
-
-
-def arm_models() -> tuple[str, ...]:
-    """The models with a table."""
-    return tuple(sorted(_TABLES))
+    if model not in ARM_TABLES:
+        raise WrongUse(f"arm model '{model}' is not known; known: {', '.join(sorted(ARM_TABLES))}")
+    return ARM_TABLES[model]
 
 
 def _tensors(rows: list[tuple[float, float, float, float, float, float]]) -> FloatArray:
@@ -93,7 +88,7 @@ def _table(
     )
 
 
-_TABLES: Final[dict[str, ArmTable]] = {
+ARM_TABLES: Final[dict[str, ArmTable]] = {
     "ur3e": _table(
         (0.15185, 0.13105, 0.08535, 0.0921),
         (-0.24355, -0.2132),

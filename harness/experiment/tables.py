@@ -11,7 +11,7 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import TouchstoneError, WrongUse
-from harness.basics.metrics import Interval, bootstrap, mean, median, share_above
+from harness.basics.metrics import Interval, bootstrap, mean, median
 from harness.basics.whole_file import write_text_whole
 from harness.basics.worker_pool import worker_pool
 from harness.bench.scene import SceneFile, scene_from_json
@@ -227,8 +227,6 @@ def _statistics(
     errors: FloatArray, gross: float, marked: Sequence[bool] = ()
 ) -> tuple[Interval, Interval, Interval]:
     """Median, mean and share of gross errors: those that their runs mark, or those beyond ``gross`` m."""
-    if len(marked) == len(errors):
-        share = bootstrap(np.array(marked, dtype=np.float64), mean)
-    else:
-        share = bootstrap(errors, share_above(gross))
+    is_gross = np.array(marked) if len(marked) == len(errors) else errors > gross
+    share = bootstrap(is_gross.astype(np.float64), mean)
     return bootstrap(errors, median), bootstrap(errors, mean), share

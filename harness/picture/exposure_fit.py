@@ -79,9 +79,9 @@ def group_variance(moved: FloatArray, groups: Together) -> FloatArray:
     """Variance of values that groups of pixels move, each kind of group as a whole.
 
     Pixels are not so many witnesses as there are. Noise, a highlight or a network's patch err alike in pixels
-    that are near each other; a camera's curve and JPEG, which rounds a whole surface's colour to one code, in
     that are near each other; a camera's curve and JPEG, which rounds a whole surface's colour to one code,
-    Economic Statistics 29(2), 2011).
+    in those of one brightness. Both at once are groups of two kinds (Cameron, Gelbach and Miller, J. Business
+    and Economic Statistics 29(2), 2011).
 
     Of blocks, and of shades, less what both count: a group. It is never less than that of blocks alone.
 

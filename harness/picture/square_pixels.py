@@ -18,12 +18,8 @@ LEAST_ASPECT, MOST_ASPECT = 0.5, 2.0
 """Of a pixel's height over its width: beyond, rows or columns would be made up of too few."""
 
 
-_STATED = "made square by"
-
-
-def stated(aspect: float) -> str:
-    """What a calibration's ``made_from`` says of its presses' aspect; nothing where pixels were square."""
-    return "" if aspect == 1.0 else f", {_STATED} {aspect:.6f}"
+MADE_SQUARE = "made square by"
+"""What a calibration's ``made_from`` says before its presses' aspect, where pixels were not square."""
 
 
 def aspect_stated(made_from: str) -> float:
@@ -37,7 +33,7 @@ def aspect_stated(made_from: str) -> float:
     Raises:
         OutOfDomain: an aspect that is none of a camera.
     """
-    found = re.search(rf"{_STATED} ([0-9.]+)", made_from)
+    found = re.search(rf"{MADE_SQUARE} ([0-9.]+)", made_from)
     if found is None:
         return 1.0
     aspect = float(found.group(1))

@@ -16,7 +16,7 @@ import numpy as np
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused
 from harness.basics.geometry import apply, rotation_from_vector, transform
-from harness.bench.ur_tables import LINKS, arm_models, arm_table
+from harness.bench.ur_tables import ARM_TABLES, LINKS, arm_table
 
 _FILES: Final = ("base", "shoulder", "upperarm", "forearm", "wrist1", "wrist2", "wrist3")
 
@@ -83,7 +83,7 @@ def _stl_vertices(path: Path) -> FloatArray:
 def _pack(folder: Path) -> None:
     target = Path(__file__).parent / "data"
     target.mkdir(exist_ok=True)
-    for model in arm_models():
+    for model in ARM_TABLES:
         hulls = {link: hull.astype(np.float32) for link, hull in placed(model, folder / model).items()}
         np.savez_compressed(target / f"{model}.npz", allow_pickle=False, **hulls)
 

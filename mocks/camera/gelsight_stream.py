@@ -18,7 +18,7 @@ import numpy as np
 
 from harness.basics.arrays import ByteArray
 from harness.basics.clock import now
-from mocks.faults import ActiveFault, saturated
+from mocks.faults import ActiveFault
 from mocks.loopback import require_own_address
 
 BOUNDARY = b"boundarydonotcross"
@@ -49,6 +49,12 @@ class StreamedView(Protocol):
 
     def sent(self) -> None:
         """A frame of the newest ``state()`` has left for every client."""
+
+
+def saturated(image: ByteArray) -> ByteArray:
+    """An overexposed ``(rows, columns, 3)`` picture: four times the light, clipped by the sensor."""
+    bright: ByteArray = np.minimum(image.astype(np.uint16) * 4, 255).astype(np.uint8)
+    return bright
 
 
 def encode(image: ByteArray) -> bytes:

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from harness.basics.errors import WrongUse
 from harness.basics.files.json_file import CHECKSUM
-from harness.bench.experiments import EXPERIMENTS, experiment_names, loaded, section_models
+from harness.bench.experiments import EXPERIMENTS, experiment_names, loaded
 from harness.bench.gap import Gap
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.sensor import MarkerGrid, SensorFile, described_sensor
@@ -97,8 +97,10 @@ def _tables(model: type[BaseModel], name: str) -> list[str]:
 
 def _scene() -> list[str]:
     lines = _of_model("The scene file", SceneFile, f"`scene.toml`: what is on the table. {UNITS}")
-    for name, reference in section_models().items():
-        section = loaded(reference)
+    for name, model in ((row.section, row.model) for row in EXPERIMENTS.values()):
+        if name is None or model is None:
+            continue
+        section = loaded(model)
         lines += ["", f"## `{name}`", "", f"The table of an experiment. {summary(section)}", ""]
         lines += table(OF_A_FILE, keys(section, nested(section, name, {})))
     return lines

@@ -69,9 +69,9 @@ class ForceSensor:
             return (math.nan,) * 6
         a, b, c, d, e, g = (part - zero for part, zero in zip(self.raw, self._zero, strict=True))
         turned = _turned(base_from_flange, (a, b, c, d, e, g))
-        arm = poses.rotated(base_from_flange, poses.translation(flange_from_tcp))
-        moment = poses.cross(arm, turned[:3])
-        return (*turned[:3], turned[3] - moment[0], turned[4] - moment[1], turned[5] - moment[2])
+        x, y, z = poses.rotated(base_from_flange, poses.translation(flange_from_tcp))
+        fx, fy, fz, tx, ty, tz = turned
+        return fx, fy, fz, tx - (y * fz - z * fy), ty - (z * fx - x * fz), tz - (x * fy - y * fx)
 
     def contact_cycles(self, direction: Vector) -> int:
         """Cycles since something first resisted motion along ``direction``; 0 where nothing does.

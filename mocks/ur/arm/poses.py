@@ -73,11 +73,6 @@ def rotated_back(a: Matrix, vector: Vector) -> Vector:
     )
 
 
-def cross(a: Vector, b: Vector) -> Vector:
-    """The vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
 def matrix_from_pose(pose: Sequence[float]) -> Matrix:
     """The transform of x, y, z (m) and a rotation vector (rad)."""
     x, y, z, rx, ry, rz = pose

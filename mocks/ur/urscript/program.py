@@ -29,7 +29,11 @@ _POSE_LENGTH: Final = 6
 
 _BLOCK_ENDS: Final = frozenset(("end", "elif", "else"))
 _MAIN: Final = "the program itself"
-_HELPERS: Final = {"truth": values.truth, "item": values.item, "pose": values.make_pose}
+_HELPERS: Final[dict[str, Callable[..., Any]]] = {
+    "truth": values.truth,
+    "item": values.item,
+    "pose": lambda *items: values.PoseValue(values.number(item) for item in items),
+}
 
 
 @dataclass(frozen=True)

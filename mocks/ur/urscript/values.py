@@ -60,11 +60,6 @@ def _copy(value: Any) -> Any:
     return type(value)(_copy(part) for part in value) if isinstance(value, list) else value
 
 
-def make_pose(*items: Any) -> PoseValue:
-    """``p[...]``."""
-    return PoseValue(number(item) for item in items)
-
-
 def number(value: Any) -> float:
     """A number, and nothing else."""
     if isinstance(value, bool) or not isinstance(value, int | float):

@@ -12,7 +12,7 @@ from harness.basics.geometry import apply, rotation_about, transform, translatio
 from harness.basics.mesh import Mesh
 from harness.bench import kinematics
 from harness.bench.sensor import GELSIGHT_R15
-from harness.bench.ur_tables import LINKS, arm_models, arm_table
+from harness.bench.ur_tables import ARM_TABLES, LINKS, arm_table
 from harness.objects.household import build
 from harness.twin.arm import add_arm, arm_parts, link_from_previous, reaches
 from harness.twin.bench import TwinBench
@@ -40,7 +40,7 @@ def box_mesh(low: list[float], high: list[float]) -> Mesh:
     return Mesh(corners, np.array(faces))
 
 
-@pytest.mark.parametrize("model", arm_models())
+@pytest.mark.parametrize("model", sorted(ARM_TABLES))
 def test_mujoco_puts_the_flange_where_the_tables_do(model: str) -> None:
     spec = mujoco.MjSpec()
     add_arm(spec, model)
@@ -54,7 +54,7 @@ def test_mujoco_puts_the_flange_where_the_tables_do(model: str) -> None:
         assert np.abs(data.xmat[flange].reshape(3, 3) - expected[:3, :3]).max() < 1e-12
 
 
-@pytest.mark.parametrize("model", arm_models())
+@pytest.mark.parametrize("model", sorted(ARM_TABLES))
 def test_mujoco_weighs_what_the_tables_say_where_they_say(model: str) -> None:
     spec = mujoco.MjSpec()
     add_arm(spec, model)
@@ -74,7 +74,7 @@ def test_mujoco_weighs_what_the_tables_say_where_they_say(model: str) -> None:
         assert np.abs(tensor - expected).max() < 1e-9
 
 
-@pytest.mark.parametrize("model", arm_models())
+@pytest.mark.parametrize("model", sorted(ARM_TABLES))
 def test_no_point_of_a_link_moves_further_than_its_reach_allows(model: str) -> None:
     parts = arm_parts(model)
     reach = reaches(model, parts)
@@ -95,7 +95,7 @@ def test_no_point_of_a_link_moves_further_than_its_reach_allows(model: str) -> N
     assert attained[0, 6] > 0.8 * reach[0, 6]  # and the bound is not idle
 
 
-@pytest.mark.parametrize("model", arm_models())
+@pytest.mark.parametrize("model", sorted(ARM_TABLES))
 def test_the_shipped_hulls_are_the_makers(shared_data: Path, model: str) -> None:
     theirs = placed(model, shared_data / "robot" / "ur_collision_meshes" / model)
     shipped = link_hulls(model)

@@ -11,8 +11,8 @@ import pytest
 
 from harness.basics.arrays import ByteArray
 from harness.basics.errors import WrongUse
-from mocks.camera.gelsight_stream import BOUNDARY, MjpegServer, encode
-from mocks.faults import Fault, parse, saturated
+from mocks.camera.gelsight_stream import BOUNDARY, MjpegServer, encode, saturated
+from mocks.faults import Fault, parse
 
 
 class Counter:
