@@ -18,9 +18,8 @@ import numpy as np
 
 from drivers.microphone.blocks import Block, Format
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray
-from harness.bench.acquisition_channels import PRESSURE, block_channel
-from harness.bench.microphone_take import BAD, CALLBACK, CLOCK, CLOCK_FIELDS, COUNT_BROKEN, FLAGS, OVERLOAD
-from harness.bench.reading import Channel, Reading
+from harness.bench.microphone_take import BAD, COUNT_BROKEN, OVERLOAD, readings_of_take
+from harness.bench.reading import Reading
 
 CRYSTAL_DRIFT = 100e-6
 """Standard deviation of an audio crystal's rate about its nominal one, before anything is measured."""
@@ -247,15 +246,5 @@ def readings(
     raised = np.array([block.flags | flags for block in take])
     callback = np.array([(block.arrived, block.age) for block in take])
     time = clock.time - form.latency
-    line = np.array([[clock.index, time, clock.rate, clock.residual, clock.uncertainty, opened]])
-    return (
-        Reading(block_channel(PRESSURE, form.block, form.rate), times, counts),
-        Reading(_channel(FLAGS, "1", (), "uint8", form), times, raised),
-        Reading(_channel(CALLBACK, "s", (2,), "float64", form), times, callback),
-        Reading(_channel(CLOCK, "1", (len(CLOCK_FIELDS),), "float64", form), times[:1], line),
-    )
-
-
-def _channel(name: str, unit: str, shape: tuple[int, ...], dtype: str, form: Format) -> Channel:
-    """A channel of a microphone; its nominal rate is that of its samples, not of its blocks."""
-    return Channel(name, unit, shape, dtype, "", float(form.rate))
+    line = np.array([clock.index, time, clock.rate, clock.residual, clock.uncertainty, opened])
+    return readings_of_take(times, counts, raised, callback, line, float(form.rate))

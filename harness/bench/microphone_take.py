@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused
-from harness.bench.reading import Reading
+from harness.bench.acquisition_channels import PRESSURE, block_channel
+from harness.bench.reading import Channel, Reading
 
 FLAGS = "microphone.flags"
 CLOCK = "microphone.clock"
@@ -117,3 +119,28 @@ def words(flags: int) -> tuple[str, ...]:
     if unknown:
         raise DataRefused(f"a microphone's flags have the bit {unknown}, which means nothing here")
     return tuple(text for bit, text in _WORDS.items() if flags & bit)
+
+
+def readings_of_take(
+    times: FloatArray, counts: AnyArray, flags: AnyArray, callbacks: FloatArray, line: FloatArray, rate: float
+) -> tuple[Reading, ...]:
+    """The recorded form of a take.
+
+    Args:
+        times: ``(n,)`` s on the bench clock, of the first sample of each block.
+        counts: ``(n, block)``.
+        flags: ``(n,)`` of each block.
+        callbacks: ``(n, 2)`` s: when each block was handed over, and the age that was stated of it.
+        line: of the fitted clock, in the order of ``CLOCK_FIELDS``.
+        rate: nominal, of samples: not of blocks.
+    """
+
+    def channel(name: str, unit: str, shape: tuple[int, ...], dtype: str) -> Channel:
+        return Channel(name, unit, shape, dtype, "", rate)
+
+    return (
+        Reading(block_channel(PRESSURE, counts.shape[1], rate), times, counts),
+        Reading(channel(FLAGS, "1", (), "uint8"), times, flags),
+        Reading(channel(CALLBACK, "s", (2,), "float64"), times, callbacks),
+        Reading(channel(CLOCK, "1", (len(CLOCK_FIELDS),), "float64"), times[:1], line[None]),
+    )

@@ -6,24 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
-from harness.bench.acquisition_channels import (
-    CLOCK,
-    CLOCK_FIELDS,
-    FLAG_FIELDS,
-    FLAGS,
-    FORCE,
-    PRESSURE,
-    block_channel,
-    judge,
-)
+from harness.bench.acquisition_channels import BLOCK, CaptureForm, readings_of_capture
 from harness.bench.device import Health
-from harness.bench.reading import Channel, Reading
+from harness.bench.reading import Reading
 from harness.bench.station_sections import HammerSection
 from mocks.daq.strike_counts import SKEW, StrikeCounts
 from mocks.in_process.arm import InProcessArm, Stage
-
-BLOCK = 500
-"""Samples in a recorded block."""
 
 _REST = 2500
 
@@ -113,34 +101,8 @@ class InProcessHammer:
         return self._idle[np.arange(count) % len(self._idle)]
 
     def _readings(self, counts: AnyArray, start: float) -> tuple[Reading, ...]:
-        flags = judge(
-            counts[:, 0], counts[:, 1], self._threshold, self._full_scale, self._full_scale, self._rate
-        )
-        onset = -1 if flags.silent else flags.onset
-        said = {
-            "onset": onset,
-            "overload": flags.overload,
-            "double_hit": flags.double_hit,
-            "silent": flags.silent,
-            "threshold": self._threshold,
-        }
-        at = start + max(0, onset) / self._rate
         edges = np.array([0.0, float(len(counts))])
-        return (
-            self._blocks(FORCE, counts[:, 0], start),
-            self._blocks(PRESSURE, counts[:, 1], start + SKEW / self._rate),
-            Reading(
-                Channel(CLOCK, "1", (len(CLOCK_FIELDS),), "float64"),
-                start + edges / self._rate,
-                np.stack([edges, np.zeros(2)], axis=1),
-            ),
-            Reading(
-                Channel(FLAGS, "1", (len(FLAG_FIELDS),), "float64"),
-                np.array([at]),
-                np.array([[float(said[field]) for field in FLAG_FIELDS]]),
-            ),
-        )
-
-    def _blocks(self, name: str, counts: AnyArray, start: float) -> Reading:
-        times = start + np.arange(0, len(counts), BLOCK) / self._rate
-        return Reading(block_channel(name, BLOCK, self._rate), times, counts.reshape(-1, BLOCK))
+        form = CaptureForm(self._rate, self._threshold, self._full_scale)
+        starts = start, start + SKEW / self._rate
+        arrivals = np.stack([edges, start + edges / self._rate], axis=1)
+        return readings_of_capture(counts, starts, self._rate, form, arrivals, np.zeros(2))

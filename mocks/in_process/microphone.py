@@ -6,10 +6,9 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.resampling import resample
-from harness.bench.acquisition_channels import PRESSURE, block_channel
 from harness.bench.device import Health
-from harness.bench.microphone_take import CALLBACK, CLOCK, CLOCK_FIELDS, FLAGS, OVERLOAD
-from harness.bench.reading import Channel, Reading
+from harness.bench.microphone_take import OVERLOAD, readings_of_take
+from harness.bench.reading import Reading
 from harness.bench.station_sections import MicrophoneSection
 from mocks.in_process.arm import Stage
 from mocks.in_process.hammer import Fired, InProcessHammer
@@ -123,24 +122,7 @@ class InProcessMicrophone:
         times = numbers / self._true_rate + late
         full = self._converter.full_scale
         flag = OVERLOAD if np.any((counts >= full) | (counts <= -full - 1)) else 0
-        said = {
-            "sample": float(numbers[-1]),
-            "time": float(times[-1]),
-            "rate": self._true_rate,
-            "residual": _RESIDUAL,
-            "uncertainty": UNCERTAINTY,
-            "opened": self._opened,
-        }
-        callbacks = np.stack(
-            [times + BLOCK / self._true_rate, np.full(len(times), BLOCK / self._true_rate)], axis=1
-        )
-        line = np.array([[said[field] for field in CLOCK_FIELDS]])
-        return (
-            Reading(block_channel(PRESSURE, BLOCK, self._nominal), times, counts),
-            Reading(self._channel(FLAGS, "1", (), "uint8"), times, np.full(len(times), flag)),
-            Reading(self._channel(CALLBACK, "s", (2,), "float64"), times, callbacks),
-            Reading(self._channel(CLOCK, "1", (len(CLOCK_FIELDS),), "float64"), times[:1], line),
-        )
-
-    def _channel(self, name: str, unit: str, shape: tuple[int, ...], dtype: str) -> Channel:
-        return Channel(name, unit, shape, dtype, "", self._nominal)
+        line = np.array([numbers[-1], times[-1], self._true_rate, _RESIDUAL, UNCERTAINTY, self._opened])
+        age = BLOCK / self._true_rate
+        callbacks = np.stack([times + age, np.full(len(times), age)], axis=1)
+        return readings_of_take(times, counts, np.full(len(times), flag), callbacks, line, self._nominal)
