@@ -302,6 +302,10 @@ class Strike:
             return "a channel was overloaded"
         return "the hammer hit twice" if self.double_hit else ""
 
+    def marked_lost(self, why: str) -> "Strike":
+        """The same strike, not to be used for a reason in words."""
+        return replace(self, lost=why, overload=True)
+
     @property
     def times(self) -> FloatArray:
         """``(t,)`` s on the bench clock."""
@@ -411,10 +415,6 @@ def of_one_stream(strikes: Sequence[Strike | None]) -> tuple[Strike | None, ...]
     most = max(streams, key=streams.count)
     why = "the microphone was opened anew in between: its latency may be another"
     return tuple(
-        strike if strike is None or strike.fault or strike.opened == most else _lost(strike, why)
+        strike if strike is None or strike.fault or strike.opened == most else strike.marked_lost(why)
         for strike in strikes
     )
-
-
-def _lost(strike: Strike, why: str) -> Strike:
-    return replace(strike, lost=why, overload=True)

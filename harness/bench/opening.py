@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from harness.basics.errors import BenchFault, TouchstoneError, WrongUse
 from harness.basics.files.named_file import nearest
@@ -14,6 +14,7 @@ from harness.bench.device import Arm, Health, ImpactHammer, Microphone, TactileC
 from harness.bench.listening import capture
 from harness.bench.scene import SceneFile, scene_from_options
 from harness.bench.station import (
+    Instrument,
     RunContext,
     make_arm,
     make_camera,
@@ -24,14 +25,7 @@ from harness.bench.station import (
 )
 from harness.bench.station_file import Station
 
-
-class _Instrument(Protocol):
-    def open(self) -> None: ...
-
-    def close(self) -> None: ...
-
-
-_Made = TypeVar("_Made", bound=_Instrument)
+_Made = TypeVar("_Made", bound=Instrument)
 
 
 @dataclass(frozen=True)

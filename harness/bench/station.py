@@ -153,19 +153,15 @@ def wired(
 
 def addressed(station: Station, where: LabAddresses) -> Station:
     """A mocked station with the addresses that its lab took."""
-    camera = station.camera
-    if camera is not None:
-        camera = camera.model_copy(update={"url": where.camera})
-    hammer = station.hammer
-    if hammer is not None:
-        hammer = hammer.model_copy(update={"port": where.hammer})
-    microphone = station.microphone
-    if microphone is not None:
-        microphone = microphone.model_copy(update={"device": where.microphone})
-    arm = station.arm.model_copy(update={"address": where.arm})
-    gel = station.gel.model_copy(update={"url": where.gel})
-    found = {"arm": arm, "gel": gel, "camera": camera, "hammer": hammer, "microphone": microphone}
-    return station.model_copy(update=found)
+    keys = {"arm": "address", "gel": "url", "camera": "url", "hammer": "port", "microphone": "device"}
+    sections = {name: getattr(station, name) for name in keys}
+    return station.model_copy(
+        update={
+            name: section.model_copy(update={keys[name]: getattr(where, name)})
+            for name, section in sections.items()
+            if section is not None
+        }
+    )
 
 
 def _surround(stack: ExitStack, environment: Mapping[str, str]) -> None:
@@ -276,7 +272,7 @@ def make_microphone(station: Station) -> Microphone | None:
     return made
 
 
-def _open_all(stack: ExitStack, instruments: Mapping[str, "_Opened | None"]) -> None:
+def _open_all(stack: ExitStack, instruments: Mapping[str, "Instrument | None"]) -> None:
     failures: dict[str, TouchstoneError] = {}
     for name, instrument in instruments.items():
         if instrument is None:
@@ -296,7 +292,7 @@ def _open_all(stack: ExitStack, instruments: Mapping[str, "_Opened | None"]) -> 
         raise kind(f"{len(failures)} instruments did not open:{listed}")
 
 
-class _Opened(Protocol):
+class Instrument(Protocol):
     """What every instrument is."""
 
     def open(self) -> None:

@@ -155,6 +155,7 @@ _DECAY = 20.0
 _LOWEST = 300.0
 _FLOOR = 0.05
 _SILENT = 1e-300
+_UNPLACED = "its sound cannot be brought into time with that of the other strikes"
 
 
 def synchronised(strikes: Sequence[Strike | None]) -> tuple[Strike | None, ...]:
@@ -184,7 +185,7 @@ def synchronised(strikes: Sequence[Strike | None]) -> tuple[Strike | None, ...]:
     chosen = {k: strike for k in own if (strike := strikes[k]) is not None}
     delays = _delays(list(chosen.values()))
     moved = {
-        k: _lost(strike) if delay is None else _moved(strike, delay)
+        k: strike.marked_lost(_UNPLACED) if delay is None else _moved(strike, delay)
         for (k, strike), delay in zip(chosen.items(), delays, strict=True)
     }
     return tuple(moved.get(k, strike) for k, strike in enumerate(strikes))
@@ -287,9 +288,3 @@ def _moved(strike: Strike, delay: float) -> Strike:
     times = np.clip(np.arange(len(strike.pressure)) / strike.rate + delay, 0.0, last)
     pressure = resample(strike.pressure, 0.0, strike.rate, times, strike.rate)
     return replace(strike, pressure=read_only(pressure))
-
-
-def _lost(strike: Strike) -> Strike:
-    return replace(
-        strike, lost="its sound cannot be brought into time with that of the other strikes", overload=True
-    )

@@ -18,7 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from harness.basics.clock import now
 from harness.basics.errors import RecordingDamaged, WrongUse
 from harness.basics.files.foreign_file import MOST_JSON, read_bounded
-from harness.basics.files.json_file import CHECKSUM, checksum_of
+from harness.basics.files.json_file import CHECKSUM, checksum_of, parse_strictly
 from harness.basics.files.lock_file import hold_folder
 from harness.basics.whole_file import make_folder, write_text_whole
 from harness.bench.named_files import require_run
@@ -195,7 +195,7 @@ def _read_header(path: Path) -> RunHeader:
 def header_of(data: bytes, path: Path) -> RunHeader:
     """What the bytes of a ``run.json`` say; ``RecordingDamaged`` naming the file where they are others."""
     try:
-        return _checked(json.loads(data, parse_constant=_no_constant), path)
+        return _checked(parse_strictly(data), path)
     except (ValueError, RecursionError) as error:
         raise RecordingDamaged(f"{path} is not JSON as a run writes it; {_COPY}") from error
 
@@ -223,10 +223,6 @@ def _utc(wall_ns: int) -> str:
 def _duration(nanoseconds: int) -> str:
     seconds = nanoseconds / 1e9
     return f"{seconds:.1f} s" if seconds < 120.0 else f"{seconds / 60.0:,.0f} min"
-
-
-def _no_constant(name: str) -> float:
-    raise ValueError(name)
 
 
 _HEADER = TypeAdapter(RunHeader)

@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 from typing import Protocol, TypeVar
@@ -45,53 +45,45 @@ class Quiet:
         """Nothing."""
 
 
-class Interrupt:
-    """Ctrl-C once: end after the step. Twice: stop the arm now."""
-
-    def __init__(self, stop_arm: "StopArm") -> None:
-        self.requested = threading.Event()
-        self._stop_arm = stop_arm
-
-    def __call__(self, _signal: int, _frame: FrameType | None) -> None:
-        """Handle SIGINT."""
-        if self.requested.is_set():
-            self._stop_arm()
-            raise KeyboardInterrupt
-        self.requested.set()
-
-
-class StopArm(Protocol):
-    """Stops the arm from any thread and in any state."""
-
-    def __call__(self) -> None:
-        """Stop now."""
-
-
 @contextmanager
-def interruptible(stop_arm: StopArm) -> Iterator[Interrupt]:
-    """Take over Ctrl-C for the length of a session (in the main thread; elsewhere it stays as it is)."""
-    interrupt = Interrupt(stop_arm)
+def interruptible(stop_arm: Callable[[], None]) -> Iterator[threading.Event]:
+    """Take over Ctrl-C for the length of a session (in the main thread; elsewhere it stays as it is).
+
+    Once: the event is set, and the session ends after the step. Twice: the arm stops now.
+    """
+    requested = threading.Event()
+
+    def handle(_signal: int, _frame: FrameType | None) -> None:
+        if requested.is_set():
+            stop_arm()
+            raise KeyboardInterrupt
+        requested.set()
+
     if threading.current_thread() is not threading.main_thread():
-        yield interrupt
+        yield requested
         return
-    previous = signal.signal(signal.SIGINT, interrupt)
+    previous = signal.signal(signal.SIGINT, handle)
     try:
-        yield interrupt
+        yield requested
     finally:
         signal.signal(signal.SIGINT, previous)
 
 
 def perform(
-    experiment: StepPerformer[B], bench: B, recording: Recording, stop_arm: StopArm, progress: Progress
+    experiment: StepPerformer[B],
+    bench: B,
+    recording: Recording,
+    stop_arm: Callable[[], None],
+    progress: Progress,
 ) -> bool:
     """Perform and commit every remaining step; False where Ctrl-C ended it early.
 
     A step that fails is not committed and its exception goes on to the caller; the steps
     before it stay on the disk.
     """
-    with interruptible(stop_arm) as interrupt:
+    with interruptible(stop_arm) as interrupted:
         for step in experiment.steps(recording):
-            if interrupt.requested.is_set():
+            if interrupted.is_set():
                 return False
             progress.began(step)
             start = now()
@@ -99,4 +91,4 @@ def perform(
             seconds = now() - start
             recording.commit(step, readings, seconds)
             progress.ended(step, seconds)
-    return not interrupt.requested.is_set()
+    return not interrupted.is_set()

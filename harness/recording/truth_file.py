@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from harness.basics.errors import RecordingDamaged
 from harness.basics.files.foreign_file import MOST_JSON, read_bounded
-from harness.basics.files.json_file import CHECKSUM, checksum_of
+from harness.basics.files.json_file import CHECKSUM, checksum_of, parse_strictly
 from harness.basics.whole_file import write_text_whole
 
 SCHEMA = 2
@@ -55,7 +55,7 @@ def read_truth_file(path: Path) -> dict[str, Any]:
     """
     data = read_bounded(path, "the truth of a run", MOST_JSON, RecordingDamaged)
     try:
-        fields = json.loads(data, parse_constant=_refuse_constant)
+        fields = parse_strictly(data)
     except (ValueError, RecursionError) as error:
         raise RecordingDamaged(f"{path} is damaged: it is not JSON") from error
     schema = fields.get("schema") if isinstance(fields, dict) else None
@@ -74,7 +74,3 @@ def read_truth_file(path: Path) -> dict[str, Any]:
     if isinstance(size, bool) or not isinstance(size, int | float) or not isfinite(size) or size <= 0.0:
         raise RecordingDamaged(f"{path} is damaged: the object's longest side is {size!r} m")
     return dict(fields)
-
-
-def _refuse_constant(name: str) -> float:
-    raise ValueError(name)

@@ -1,6 +1,6 @@
 """What a mocked controller is told at its start, and what it asks of the bench around it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -33,18 +33,13 @@ class ContactModel(Protocol):
         """
 
 
-class OnCycle(Protocol):
-    """Is told where the arm is, once a cycle of 2 ms; called by keyword-free position."""
+OnCycle = Callable[[float, Six, Matrix], None]
+"""Is told where the arm is, once a cycle of 2 ms: time on the controller's clock in s, joints, and
+``base_from_flange``."""
 
-    def __call__(self, time: float, joints: Sequence[float], base_from_flange: Matrix, /) -> None:
-        """Time on the controller's clock in s, ``(6,)`` rad, ``(4, 4)`` nested."""
-
-
-class OnOutputs(Protocol):
-    """Is told of every change of the digital outputs."""
-
-    def __call__(self, bits: int, /) -> None:
-        """All of them, as RTDE numbers them: standard 0 to 7, configurable 8 to 15, tool 16 and 17."""
+OnOutputs = Callable[[int], None]
+"""Is told of every change of the digital outputs: all of them, as RTDE numbers them, standard 0 to 7,
+configurable 8 to 15, tool 16 and 17."""
 
 
 class Cue(Protocol):

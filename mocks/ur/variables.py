@@ -15,7 +15,7 @@ from mocks.ur.robot import BITS, NUMERIC, RobotMode
 Read = Callable[[Controller], Any]
 Write = Callable[[Controller, Any], None]
 
-_ZEROS: Final = (0.0,) * 6
+_ZEROS: Final[dict[str, Any]] = {"VECTOR6D": (0.0,) * 6, "DOUBLE": 0.0}
 _JOINT_RUNNING, _JOINT_POWER_OFF = 253, 239
 _LAST_WORD: Final = BITS - 64
 
@@ -113,47 +113,23 @@ def _modes() -> dict[str, Output]:
 
 def _constants() -> dict[str, Output]:
     """What is not modelled."""
-    six = (
-        "target_current",
-        "target_moment",
-        "actual_current",
-        "joint_control_output",
-        "actual_current_window",
-    )
-    scalars = {
-        "actual_execution_time": 0.0,
-        "actual_momentum": 0.0,
-        "actual_main_voltage": 48.0,
-        "actual_robot_voltage": 48.0,
-        "actual_robot_current": 0.5,
-        "standard_analog_input0": 0.0,
-        "standard_analog_input1": 0.0,
-        "io_current": 0.0,
-        "tool_analog_input0": 0.0,
-        "tool_analog_input1": 0.0,
-        "tool_output_current": 0.0,
-        "tool_temperature": 30.0,
-        "collision_detection_ratio": 0.0,
-        "time_scale_source": 0.0,
-    }
-    numbers = {
-        "tool_mode": ("UINT32", 253),
-        "tool_output_voltage": ("INT32", 0),
-        "tool_analog_input_types": ("UINT32", 0),
-        "analog_io_types": ("UINT32", 0),
-        "euromap67_input_bits": ("UINT32", 0),
-        "euromap67_output_bits": ("UINT32", 0),
-        "euromap67_24V_voltage": ("DOUBLE", 0.0),
-        "euromap67_24V_current": ("DOUBLE", 0.0),
-        "tool_output_mode": ("UINT8", 0),
-        "tool_digital_output0_mode": ("UINT8", 0),
-        "tool_digital_output1_mode": ("UINT8", 0),
-        "script_control_line": ("UINT32", 0),
+    zeros = {
+        "VECTOR6D": "target_current target_moment actual_current joint_control_output actual_current_window",
+        "DOUBLE": "actual_execution_time actual_momentum standard_analog_input0 standard_analog_input1 "
+        "io_current tool_analog_input0 tool_analog_input1 tool_output_current collision_detection_ratio "
+        "time_scale_source euromap67_24V_voltage euromap67_24V_current",
+        "UINT32": "tool_analog_input_types analog_io_types euromap67_input_bits euromap67_output_bits "
+        "script_control_line",
+        "UINT8": "tool_output_mode tool_digital_output0_mode tool_digital_output1_mode",
+        "INT32": "tool_output_voltage",
     }
     return {
-        **{name: _constant("VECTOR6D", _ZEROS) for name in six},
-        **{name: _constant("DOUBLE", value) for name, value in scalars.items()},
-        **{name: _constant(kind, value) for name, (kind, value) in numbers.items()},
+        **{name: _constant(kind, _ZEROS.get(kind, 0)) for kind in zeros for name in zeros[kind].split()},
+        "actual_main_voltage": _constant("DOUBLE", 48.0),
+        "actual_robot_voltage": _constant("DOUBLE", 48.0),
+        "actual_robot_current": _constant("DOUBLE", 0.5),
+        "tool_temperature": _constant("DOUBLE", 30.0),
+        "tool_mode": _constant("UINT32", 253),
         "joint_temperatures": _constant("VECTOR6D", (30.0,) * 6),
         "actual_joint_voltage": _constant("VECTOR6D", (48.0,) * 6),
         "actual_tool_accelerometer": _constant("VECTOR3D", (0.0, 0.0, 9.82)),
@@ -186,21 +162,14 @@ def _setter(registers: Callable[[Controller], list[Any]], index: int) -> Write:
 
 def _inputs() -> dict[str, InputVariable]:
     masked = {
-        "speed_slider_mask": "UINT32",
-        "speed_slider_fraction": "DOUBLE",
-        "standard_digital_output_mask": "UINT8",
-        "standard_digital_output": "UINT8",
-        "configurable_digital_output_mask": "UINT8",
-        "configurable_digital_output": "UINT8",
-        "tool_digital_output_mask": "UINT8",
-        "tool_digital_output": "UINT8",
-        "standard_analog_output_mask": "UINT8",
-        "standard_analog_output_type": "UINT8",
-        "standard_analog_output_0": "DOUBLE",
-        "standard_analog_output_1": "DOUBLE",
+        "UINT32": "speed_slider_mask",
+        "DOUBLE": "speed_slider_fraction standard_analog_output_0 standard_analog_output_1",
+        "UINT8": "standard_digital_output_mask standard_digital_output configurable_digital_output_mask "
+        "configurable_digital_output tool_digital_output_mask tool_digital_output "
+        "standard_analog_output_mask standard_analog_output_type",
     }
     return {
-        **{name: InputVariable(kind, None) for name, kind in masked.items()},
+        **{name: InputVariable(kind, None) for kind in masked for name in masked[kind].split()},
         **{
             f"input_int_register_{i}": InputVariable("INT32", _setter(lambda c: c.robot.inputs.ints, i))
             for i in range(NUMERIC)

@@ -24,6 +24,15 @@ def checksum_of(fields: Mapping[str, Any]) -> str:
     return sha256(json.dumps(summed, sort_keys=True).encode()).hexdigest()
 
 
+def parse_strictly(data: bytes) -> Any:
+    """Parse JSON, and refuse NaN and infinities; raises ``ValueError`` or ``RecursionError``."""
+
+    def refuse(name: str) -> float:
+        raise ValueError(name)
+
+    return json.loads(data, parse_constant=refuse)
+
+
 def write_model(model: BaseModel, path: Path) -> None:
     """Write the file, whole or not at all."""
     write_text_whole(path, json.dumps(model.model_dump(by_alias=True), indent=1, allow_nan=False) + "\n")
