@@ -194,12 +194,11 @@ class Lab:
     def _plug_in(self, strikes: "StrikeCounts", card: "tuple[SoundCard, Wire] | None") -> None:
         """Begin the hammer's box: the last child, so that nobody else holds its end of the cable."""
         from mocks.daq.box import DaqBox, Source  # by runs that are to be heard, and by no others
-        from mocks.daq.strike_counts import Played, Striker
+        from mocks.daq.strike_counts import StrikesOnBox
 
         source: Source
         if card is None:
-            striker = Striker(strikes, lambda: self._shared.firing)
-            source = Played(strikes.idle(), striker.next_record)
+            source = StrikesOnBox(strikes, lambda: self._shared.firing)
         else:
             from mocks.sound_card.strike_on_card import StrikesOnCard
 

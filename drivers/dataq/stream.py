@@ -3,7 +3,6 @@
 import contextlib
 import os
 import select
-import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -20,6 +19,7 @@ from harness.basics.arrays import AnyArray, BoolArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
 from harness.basics.starvation import LATE, WATCH, name_cause
+from harness.basics.worker_pool import end_process
 from harness.bench.clock_fit import ClockFit
 
 STALL = 2.0
@@ -386,15 +386,8 @@ class Fetcher:
 
     def end(self) -> None:
         """End the process; the port is this program's again."""
-        assert self._process.stdin is not None
         assert self._process.stdout is not None
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
-        try:
-            self._process.wait(_END)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        end_process(self._process, _END)
         self._process.stdout.close()
 
     def _frames(self) -> Iterator[Arrival]:

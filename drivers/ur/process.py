@@ -2,7 +2,6 @@
 
 import contextlib
 import itertools
-import subprocess
 import tempfile
 import threading
 import time
@@ -19,6 +18,7 @@ from harness.basics.errors import (
     SafetyStop,
     TouchstoneError,
 )
+from harness.basics.worker_pool import end_process
 
 BEAT_PERIOD: Final = 0.02  # s between heartbeats while a motion is waited for
 RING_SECONDS: Final = 60.0
@@ -143,13 +143,7 @@ class ChildProcess:
 
     def end(self, seconds: float) -> None:
         """Close the child's input, so that it stops the arm and ends; kill it after ``seconds``."""
-        if self._process.stdin is not None:
-            with contextlib.suppress(OSError):
-                self._process.stdin.close()
-        try:
-            self._process.wait(seconds)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
+        end_process(self._process, seconds)
         self._collect()
 
     def kill(self) -> None:

@@ -1,6 +1,8 @@
-"""Worker processes that end with whoever started them, however that ends."""
+"""Child processes: a pool that ends with whoever started it, and one process ended by its input."""
 
+import contextlib
 import os
+import subprocess
 import threading
 import time
 from concurrent.futures import ProcessPoolExecutor
@@ -35,3 +37,15 @@ def _end_without(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(PERIOD)
     os._exit(1)  # nobody is left to take a result
+
+
+def end_process(process: subprocess.Popen[bytes], seconds: float) -> None:
+    """Close a process's standard input, so that it ends; kill it after ``seconds``."""
+    if process.stdin is not None:
+        with contextlib.suppress(OSError):  # what was not yet sent no longer matters
+            process.stdin.close()
+    try:
+        process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

@@ -21,6 +21,7 @@ from harness.basics.clock import now
 from harness.basics.errors import BenchFault
 from harness.basics.files.owned_folder import OwnedFolder
 from harness.basics.mesh import Mesh
+from harness.basics.worker_pool import end_process
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 
@@ -149,7 +150,9 @@ class MockLab:
         """End the lab and all its processes; may be called twice."""
         process, self._process = self._process, None
         if process is not None:
-            _end(process)
+            end_process(process, END_WITHIN)
+            if process.stdout is not None:
+                process.stdout.close()
         if self._folder is not None:
             self._folder.close()
             self._folder = None
@@ -224,17 +227,3 @@ def _addresses(ready: Mapping[str, Any]) -> LabAddresses:
         microphone=heard["device"],
         environment=heard["environment"],
     )
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    for stream in (process.stdin, process.stdout):
-        if stream is not None:
-            try:
-                stream.close()
-            except OSError:  # what was not yet sent no longer matters
-                continue
-    try:
-        process.wait(END_WITHIN)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()

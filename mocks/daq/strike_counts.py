@@ -61,37 +61,6 @@ def skewed(signal: FloatArray, fraction: float) -> FloatArray:
     return late[: len(signal)]
 
 
-class Played:
-    """Idles until there is a record to play; a ``Source``.
-
-    What a strike's record holds in front of the strike is the hammer's flight: from the moment
-    the striker is fired, every sample is the record's, whatever the timing was.
-
-    Args:
-        idle: ``(p, 2)`` int16 counts, repeated while nothing happens.
-        next_record: asked before every block; a ``(t, 2)`` int16 record to play from now on, or None.
-            A record that is still being played is broken off.
-    """
-
-    def __init__(self, idle: AnyArray, next_record: Callable[[], AnyArray | None]) -> None:
-        self._idle = idle
-        self._next_record = next_record
-        self._record: AnyArray = np.zeros((0, 2), np.int16)
-        self._record_begin = 0
-
-    def __call__(self, first: int, count: int) -> AnyArray:
-        """Counts of ``count`` scans from ``first``."""
-        record = self._next_record()
-        if record is not None:
-            self._record, self._record_begin = record, first
-        numbers = np.arange(first, first + count)
-        counts: AnyArray = self._idle[numbers % len(self._idle)].copy()
-        at = numbers - self._record_begin
-        playing = (at >= 0) & (at < len(self._record))
-        counts[playing] = self._record[at[playing]]
-        return counts
-
-
 CONVERTER_NOISE = 0.7
 """Counts rms of a 16-bit converter: its data sheet's 0.5 and the conditioner's own."""
 
@@ -137,11 +106,12 @@ class StrikeCounts:
         return self._wiring.counts(force, skewed(pressure, SKEW), noise)
 
 
-class Striker:
-    """Hands the box the record of a strike soon after the output was switched on.
+class StrikesOnBox:
+    """What inputs 0 and 1 of the hammer's box are at: idle, but for the record of each strike; a ``Source``.
 
-    A record takes longer to compute than a block lasts, so it is computed beside the box's loop;
-    what it holds in front of the blow is quiet, and a little more of that changes nothing.
+    A record takes longer to compute than a block lasts, so it is computed beside the box's loop, and begins
+    with the next block after that. What it holds in front of the blow is the hammer's flight, which is quiet,
+    and a little more of that changes nothing. A record that is still being played is broken off.
 
     Args:
         strikes: of the run.
@@ -151,19 +121,28 @@ class Striker:
     def __init__(self, strikes: StrikeCounts, firing: Callable[[], Firing]) -> None:
         self._strikes = strikes
         self._firing = firing
+        self._idle = strikes.idle()
         self._seen = firing().number
-        self._made: list[AnyArray] = []
+        self._next = 0
+        self._playing: tuple[int, AnyArray] = (0, self._idle[:0])
         self._thread: threading.Thread | None = None
 
-    def next_record(self) -> AnyArray | None:
-        """The record of a new firing, once; None while there is none."""
+    def __call__(self, first: int, count: int) -> AnyArray:
+        """Counts of ``count`` scans from ``first``."""
+        self._next = first + count
         firing = self._firing()
         busy = self._thread is not None and self._thread.is_alive()
         if firing.number != self._seen and not busy:
             self._seen = firing.number
-            self._thread = threading.Thread(target=self._make, args=(firing,), daemon=True)
+            self._thread = threading.Thread(target=self._strike, args=(firing,), daemon=True)
             self._thread.start()
-        return self._made.pop() if self._made else None
+        numbers = np.arange(first, first + count)
+        counts: AnyArray = self._idle[numbers % len(self._idle)].copy()
+        begin, record = self._playing
+        here = (numbers >= begin) & (numbers < begin + len(record))
+        counts[here] = record[numbers[here] - begin]
+        return counts
 
-    def _make(self, firing: Firing) -> None:
-        self._made.append(self._strikes.record(firing.base_from_flange, firing.step, firing.sample))
+    def _strike(self, firing: Firing) -> None:
+        record = self._strikes.record(firing.base_from_flange, firing.step, firing.sample)
+        self._playing = self._next, record

@@ -101,32 +101,6 @@ pcm.default {{ type null }}
 """
 
 
-def settings(rate: int, channels: int, quantum: int) -> str:
-    """PipeWire's configuration file."""
-    return _DAEMON.format(
-        rate=rate,
-        quantum=quantum,
-        positions=" ".join(_POSITIONS[channels]),
-        speaker=SPEAKER,
-        microphone=MICROPHONE,
-    )
-
-
-def sound_devices(socket: Path, rate: int, channels: int) -> str:
-    """ALSA's configuration file: the card's devices by name, at exactly this rate and channel count."""
-    return _DEVICES.format(
-        socket=socket, rate=rate, channels=channels, speaker=SPEAKER, microphone=MICROPHONE
-    )
-
-
-def ports(channels: int) -> tuple[list[str], list[str]]:
-    """What the sink plays, and where the microphone hears it, channel by channel."""
-    positions = _POSITIONS[channels]
-    return [f"{SPEAKER}:monitor_{each}" for each in positions], [
-        f"{MICROPHONE}:input_{each}" for each in positions
-    ]
-
-
 PACKAGES = "pipewire wireplumber pipewire-alsa libportaudio2"
 """What Debian and Ubuntu call what is needed."""
 
@@ -267,23 +241,25 @@ class SoundCard:
     def _begin(self, folder: Path) -> None:
         """PipeWire, then its session manager, then the link, then the player."""
         config, devices, socket = folder / "card.conf", folder / "devices.conf", folder / "pipewire-0"
-        config.write_text(settings(self.rate, self.channels, self._quantum))
-        devices.write_text(sound_devices(socket, self.rate, self.channels))
+        positions, names = _POSITIONS[self.channels], {"speaker": SPEAKER, "microphone": MICROPHONE}
+        places = " ".join(positions)
+        config.write_text(_DAEMON.format(rate=self.rate, quantum=self._quantum, positions=places, **names))
+        devices.write_text(_DEVICES.format(socket=socket, rate=self.rate, channels=self.channels, **names))
         self.environment = {"ALSA_CONFIG_PATH": str(devices)}
         self._spawn(["pipewire", "-c", str(config)])
         self._wait(socket.exists, "PipeWire made no socket")
         self._spawn(["wireplumber", *_policy_only()])
-        outputs, inputs = ports(self.channels)
+        # What the sink plays, and where the microphone hears it, channel by channel.
+        outputs = [f"{SPEAKER}:monitor_{each}" for each in positions]
+        inputs = [f"{MICROPHONE}:input_{each}" for each in positions]
         wanted = {*outputs, *inputs}
         self._wait(lambda: wanted <= set(self._run(["pw-link", "-io"]).split()), "PipeWire made no sink")
         for output, into in zip(outputs, inputs, strict=True):
             self._run(["pw-link", output, into])
-        player = self._spawn([sys.executable, "-m", "mocks.sound_card.player", *self._player_arguments()])
+        arguments = SPEAKER, str(self.rate), str(self.channels), str(self._quantum)
+        player = self._spawn([sys.executable, "-m", "mocks.sound_card.player", *arguments])
         if player.stdout is None or player.stdout.read(1) != b".":
             raise BenchFault(f"the mocked sound card's player did not start: {self._last_words()}")
-
-    def _player_arguments(self) -> list[str]:
-        return [SPEAKER, str(self.rate), str(self.channels), str(self._quantum)]
 
     def _spawn(self, command: list[str]) -> "subprocess.Popen[bytes]":
         log = self._log().open("ab")

@@ -1,6 +1,5 @@
 """Strikes heard by a sound card: the box plays the force and the card the sound, at one moment."""
 
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ from harness.basics.errors import WrongUse
 from harness.basics.resampling import resample
 from harness.bench.acquisition import AcquisitionCalibration
 from harness.bench.station_file import Station
-from mocks.daq.strike_counts import StrikeCounts
+from mocks.daq.strike_counts import StrikeCounts, StrikesOnBox
 from mocks.shared_pose import Firing
 from mocks.sound_card.card import SoundCard
 from mocks.sound_card.player import MEANWHILE
@@ -110,11 +109,10 @@ def plug_in_card(station: Station, folder: Path) -> tuple[SoundCard, Wire]:
     return card, Wire(rate, channels, section.channel or 0, converter, hammer.rate)
 
 
-class StrikesOnCard:
+class StrikesOnCard(StrikesOnBox):
     """What inputs 0 and 1 of the hammer's box are at, while the card plays what the microphone hears.
 
-    A strike is computed beside the box's loop, then begins on both at one scan of the box, ``AHEAD``
-    s later: in front of the blow a record is quiet, and a little more of that changes nothing.
+    A strike begins on both at one scan of the box, ``AHEAD`` s after it was computed.
 
     Args:
         strikes: of the run, the box's input 1 being shorted.
@@ -132,40 +130,16 @@ class StrikesOnCard:
         wire: Wire,
         scans: Callable[[], tuple[int, float, float]],
     ) -> None:
-        self._strikes = strikes
-        self._firing = firing
+        super().__init__(strikes, firing)
         self._card = card
         self._wire = wire
         self._scans = scans
-        self._idle = strikes.idle()
-        self._seen = firing().number
-        self._playing: tuple[int, AnyArray] = (0, self._idle[:0])
-        self._thread: threading.Thread | None = None
 
     def begin(self) -> None:
         """Let the card play what is always heard."""
         quiet = self._strikes.sound.idle(_IDLE)
         noise = self._strikes.sound.converter_noise(-1, -1).spawn(1)[0]
         self._card.play(self._wire.samples(quiet, noise), MEANWHILE)
-
-    def __call__(self, first: int, count: int) -> AnyArray:
-        """Counts of ``count`` scans from ``first``."""
-        self._look()
-        numbers = np.arange(first, first + count)
-        counts: AnyArray = self._idle[numbers % len(self._idle)].copy()
-        begin, record = self._playing
-        here = (numbers >= begin) & (numbers < begin + len(record))
-        counts[here] = record[numbers[here] - begin]
-        return counts
-
-    def _look(self) -> None:
-        """Begin to compute a strike that was fired."""
-        firing = self._firing()
-        busy = self._thread is not None and self._thread.is_alive()
-        if firing.number != self._seen and not busy:
-            self._seen = firing.number
-            self._thread = threading.Thread(target=self._strike, args=(firing,), daemon=True)
-            self._thread.start()
 
     def _strike(self, firing: Firing) -> None:
         sound = self._strikes.sound

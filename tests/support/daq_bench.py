@@ -11,7 +11,6 @@ from drivers.dataq.hammer import DataqHammer
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.bench.acquisition import AcquisitionCalibration, shipped_acquisition
 from mocks.daq.box import DaqBox, Source
-from mocks.daq.strike_counts import Played
 from mocks.faults import Fault
 from mocks.lab_processes import LabChild
 
@@ -69,10 +68,20 @@ def played(records: list[AnyArray], idle: AnyArray | None = None) -> Callable[[C
     """Plays the next of ``records`` whenever the striker is fired."""
 
     def source(fired: Callable[[], bool]) -> Source:
-        left = list(records)
-        return Played(
-            idle_counts() if idle is None else idle, lambda: left.pop(0) if fired() and left else None
-        )
+        left, quiet = list(records), idle_counts() if idle is None else idle
+        begin, record = 0, quiet[:0]
+
+        def counts(first: int, count: int) -> AnyArray:
+            nonlocal begin, record
+            if fired() and left:
+                begin, record = first, left.pop(0)
+            numbers = np.arange(first, first + count)
+            read: AnyArray = quiet[numbers % len(quiet)].copy()
+            here = (numbers >= begin) & (numbers < begin + len(record))
+            read[here] = record[numbers[here] - begin]
+            return read
+
+        return counts
 
     return source
 

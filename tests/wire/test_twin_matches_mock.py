@@ -6,7 +6,7 @@ import pytest
 from harness.basics.geometry import translation
 from harness.bench import kinematics
 from harness.bench.sensor import GELSIGHT_R15
-from harness.bench.ur_tables import arm_models
+from harness.bench.ur_tables import ARM_TABLES
 from harness.objects.household import build
 from harness.twin.bench import TwinBench
 from mocks.ur.arm import kinematics as controller
@@ -14,7 +14,7 @@ from mocks.ur.arm import kinematics as controller
 POSTURES = np.random.default_rng(5).uniform(-np.pi, np.pi, (200, 6))
 
 
-@pytest.mark.parametrize("model", arm_models())
+@pytest.mark.parametrize("model", sorted(ARM_TABLES))
 def test_the_flange_is_in_the_same_place(model: str) -> None:
     table = controller.arm_model(model)
     for joints in POSTURES:
@@ -31,7 +31,7 @@ def test_the_bodies_of_the_twin_are_where_the_controller_says_the_flange_is() ->
         assert np.abs(theirs @ flange_from_gel - bench.base_from_gel(joints)).max() < 1e-9
 
 
-@pytest.mark.parametrize("model", arm_models())
+@pytest.mark.parametrize("model", sorted(ARM_TABLES))
 def test_both_know_the_same_branches(model: str) -> None:
     table = controller.arm_model(model)
     for joints in POSTURES:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mocks.daq.strike_counts import Played, Wiring, skewed
+from mocks.daq.strike_counts import Wiring, skewed
 from tests.support.daq_bench import Bench, mocked_box, numbered, numbered_source
 
 pytestmark = pytest.mark.skipif(
@@ -142,10 +142,3 @@ def test_newtons_and_pascals_become_counts() -> None:
     wiring = Wiring(73.0, 1638.0, (120.0, -180.0), (0.0, 0.0))
     counts = wiring.counts(np.array([0.0, 10.0, 1e4]), np.array([0.0, 0.5, -1e4]), np.random.default_rng(0))
     assert counts.tolist() == [[120, -180], [850, 639], [32767, -32768]]
-
-
-def test_a_record_is_played_from_the_scan_at_which_it_was_asked_for() -> None:
-    records = [None, np.full((5, 2), 7, np.int16), None, None]
-    source = Played(np.array([[1, 2], [3, 4]], np.int16), lambda: records.pop(0))
-    read = np.concatenate([source(first, 3) for first in (0, 3, 6, 9)])
-    assert read[:, 0].tolist() == [1, 3, 1, 7, 7, 7, 7, 7, 1, 3, 1, 3]
