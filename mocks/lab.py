@@ -39,12 +39,11 @@ from harness.bench.station_sections import ArmSection
 from mocks.camera.gelsight_stream import MjpegServer
 from mocks.faults import parse
 from mocks.lab_processes import CAMERA_PORT, GEL_PORT, ChildPipe, LabChild, free_address, keep_time
-from mocks.lab_scene import read_lab_scene
+from mocks.lab_scene import read_lab_scene, strikes_of
 from mocks.shared_pose import SharedPose, StepMark
 from mocks.ur.hooks import LEFT_ABOVE, ControllerConfig
 from mocks.ur.serve import serve
 from mocks.world.gap_draw import GapDraw
-from mocks.world.instrument import strikes_of
 from mocks.world.truth import TruthFile
 from mocks.world.world import NominalBench, World
 

@@ -20,10 +20,9 @@ from harness.bench.station_file import Station
 from harness.picture.image_file import decode_jpeg
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.arm import InProcessArm, Stage
-from mocks.lab_scene import nominal_bench
+from mocks.lab_scene import nominal_bench, strikes_of
 from mocks.ur.hooks import LEFT_ABOVE
 from mocks.world.gap_draw import GapDraw
-from mocks.world.instrument import strikes_of
 from mocks.world.truth import TruthFile
 from mocks.world.world import World
 

@@ -5,7 +5,7 @@ import pytest
 
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import OutOfDomain
-from harness.picture.square_pixels import aspect_stated, made_square, square_places, stated
+from harness.picture.square_pixels import MADE_SQUARE, aspect_stated, made_square, square_places
 
 ROWS, COLUMNS = 100, 130
 
@@ -75,7 +75,8 @@ def test_what_is_no_aspect_is_refused(aspect: float) -> None:
 
 @pytest.mark.parametrize("aspect", [1.0, 0.9637, 1.03])
 def test_what_a_calibration_states_of_its_aspect_is_read_back(aspect: float) -> None:
-    assert aspect_stated(f"sha256 ab, 49 presses without marks{stated(aspect)}") == pytest.approx(aspect)
+    squared = "" if aspect == 1.0 else f", {MADE_SQUARE} {aspect:.6f}"
+    assert aspect_stated(f"sha256 ab, 49 presses without marks{squared}") == pytest.approx(aspect)
 
 
 def test_an_aspect_of_no_camera_is_refused() -> None:
