@@ -14,7 +14,7 @@ from harness.bench.sensor import GELSIGHT_R15, sensor_path
 from harness.bench.station_file import load_station, station_path
 from harness.cli import invoke
 from harness.picture.image_file import write_png
-from harness.picture.square_pixels import made_square, stated
+from harness.picture.square_pixels import MADE_SQUARE, made_square
 from harness.sim.gel.gel import R15_SKIRT, deform
 from harness.sim.optics.depth_reading import DepthReading, read_press
 from harness.sim.optics.inverse import STEADY
@@ -197,7 +197,7 @@ def test_pictures_of_high_pixels_are_made_square_as_the_presses_were(
     known: TactileCalibration, picture: ByteArray, read: DepthReading
 ) -> None:
     high = 1.05
-    header = replace(known.header, made_from=known.header.made_from + stated(high))
+    header = replace(known.header, made_from=known.header.made_from + f", {MADE_SQUARE} {high:.6f}")
     squared = replace(known, header=header)
     seen = made_square(picture, 1.0 / high)
     rest = made_square(known.background, 1.0 / high)
