@@ -33,12 +33,10 @@ OF_SOUND = (
     "harness.strikes.peaks",
     "experiments.contact_localization.sound.gains",
     "experiments.contact_localization.sound.likelihood",
-    "experiments.contact_localization.sound.likelihood",
     "experiments.contact_localization.posterior.baselines",
     "experiments.contact_localization.sound.evidence",
     "harness.strikes.spectra",
     "mocks.daq.strike_counts",
-    "mocks.world.instrument",
     "mocks.world.instrument",
     "mocks.world.sound",
 )
