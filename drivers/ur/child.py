@@ -305,10 +305,6 @@ def main() -> None:
     os._exit(0)  # the library's destructors race with its threads and crash
 
 
-if __name__ == "__main__":
-    main()
-
-
 LAST_WORDS: Final = 1.5  # s that this process may take to stop the arm when its parent is gone
 
 _LONGEST: Final = 2000  # characters of an error's text that are sent
@@ -383,3 +379,7 @@ class Parent:
         self.closed = True
         self.wake()
         threading.Timer(LAST_WORDS, self._stop_hard).start()
+
+
+if __name__ == "__main__":
+    main()
