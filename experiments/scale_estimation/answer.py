@@ -34,8 +34,7 @@ from harness.experiment.object_modes import carried_by
 from harness.picture.object_mask import mask_by_background
 from harness.picture.outline import SeenOutline, read_outline
 from harness.picture.square_pixels import aspect_stated
-from harness.recording.look_pictures import look_pictures
-from harness.recording.observation import Observation, observe_step, picture_left_out
+from harness.recording.observation import Observation, look_pictures, observe_step, picture_left_out
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 from harness.sim.optics.inverse import invert_mean
