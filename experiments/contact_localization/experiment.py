@@ -4,9 +4,8 @@ from functools import partial
 
 from experiments.contact_localization.accuracy.budget import BUDGETS
 from experiments.contact_localization.accuracy.dials import KNOBS
-from experiments.contact_localization.accuracy.solving import PROGRAM
 from experiments.contact_localization.accuracy.table import MEASUREMENT
-from experiments.contact_localization.answer import ContactAnswering
+from experiments.contact_localization.answer import PROGRAM, ContactAnswering
 from experiments.contact_localization.next_contact import ChosenContacts
 from experiments.contact_localization.plan import plan
 from experiments.contact_localization.report.report import GIVES, sources, write

@@ -25,7 +25,7 @@ import numpy as np
 
 from experiments.contact_localization.accuracy.benchmark_runs import Case, Cell, cells, performed
 from experiments.contact_localization.accuracy.dials import needs_sound
-from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, Models
+from experiments.contact_localization.answer import ESTIMATOR, PROGRAM, Models
 from experiments.contact_localization.experiment import EXPERIMENT
 from harness.basics.whole_file import write_text_whole
 from harness.bench.station_file import load_station, station_path

@@ -15,7 +15,7 @@ from experiments.contact_localization.accuracy.dials import (
     setting_name,
     settings,
 )
-from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
+from experiments.contact_localization.answer import ESTIMATOR, PROGRAM
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.posterior.dials import METHOD, SPACING
 from experiments.scale_estimation.experiment import EXPERIMENT as SCALE

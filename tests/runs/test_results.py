@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization import answer as answer_module
-from experiments.contact_localization.accuracy.solving import located
+from experiments.contact_localization.answer import located
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import result_of
 from harness.agreement.compare_run import agreement_of

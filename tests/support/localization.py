@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from experiments.contact_localization.accuracy.dials import KNOBS
-from experiments.contact_localization.accuracy.solving import located, read
-from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.answer import Answer, located, read
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.estimate import Estimate

@@ -16,15 +16,15 @@ import numpy as np
 
 from experiments.contact_localization.accuracy.budget import Run
 from experiments.contact_localization.accuracy.dials import HEARD, needs_images
-from experiments.contact_localization.accuracy.solving import (
+from experiments.contact_localization.answer import (
     PROGRAM,
     Models,
     Readings,
     loaded,
+    observe,
     prepare,
     solve,
 )
-from experiments.contact_localization.answer import observe
 from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.model import Prior
 from experiments.contact_localization.plan import plan_contacts

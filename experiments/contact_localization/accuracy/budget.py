@@ -14,8 +14,7 @@ from experiments.contact_localization.accuracy.dials import (
     needs_images,
     needs_sound,
 )
-from experiments.contact_localization.accuracy.solving import Models, Readings, prepare, read, solve
-from experiments.contact_localization.answer import observe, prior_of
+from experiments.contact_localization.answer import Models, Readings, observe, prepare, prior_of, read, solve
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import METHOD, SENSES, SPACING

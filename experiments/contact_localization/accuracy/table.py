@@ -21,7 +21,7 @@ from experiments.contact_localization.accuracy.dials import (
     settings,
     settings_by_count,
 )
-from experiments.contact_localization.accuracy.solving import ESTIMATOR, Readings, solve
+from experiments.contact_localization.answer import ESTIMATOR, Readings, solve
 from experiments.contact_localization.posterior.baselines import (
     MfccTable,
     mean_random_error,

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.accuracy.dials import accuracy_at, by_sound, grid, particles
-from experiments.contact_localization.accuracy.solving import Readings, loaded, prepare, solve
-from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.answer import Answer, Readings, loaded, prepare, solve
 from experiments.contact_localization.answer import Answer as Found
 from experiments.contact_localization.next_contact import EXPECTED
 from experiments.contact_localization.posterior.consistency import Gate

@@ -21,7 +21,7 @@ from rich.table import Table
 
 from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, perform
 from experiments.contact_localization.accuracy.dials import needs_images
-from experiments.contact_localization.accuracy.solving import Models, prepare, solve
+from experiments.contact_localization.answer import Models, prepare, solve
 from experiments.contact_localization.posterior.dials import SENSES
 from harness.bench.scene import scene_from_options
 from harness.bench.station_file import load_station, station_path

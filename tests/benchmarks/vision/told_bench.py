@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, performed
-from experiments.contact_localization.accuracy.solving import Models
+from experiments.contact_localization.answer import Models
 from experiments.contact_localization.posterior.baselines import without_images
 from experiments.contact_localization.posterior.dials import SPACING, Senses
 from harness.basics.arrays import FloatArray

@@ -11,7 +11,7 @@ from experiments.contact_localization.accuracy.dials import (
     needs_sound,
     setting_name,
 )
-from experiments.contact_localization.accuracy.solving import Models, read, solve
+from experiments.contact_localization.answer import Models, read, solve
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import SENSES, SPACING
 from harness.basics.errors import WrongUse
@@ -82,7 +82,7 @@ def front(audio_seconds: float, touch_seconds: float, audio_error: float = 2e-3)
 
 
 def test_a_budget_that_only_sound_keeps_reads_no_image(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("experiments.contact_localization.accuracy.solving.heights_or_refusal", never)
+    monkeypatch.setattr("experiments.contact_localization.answer.heights_or_refusal", never)
     found = ask(run, front(0.01, 1e4), Target(seconds=60.0))
     assert found.point.levels == AUDIO
     assert found.kept
@@ -90,7 +90,7 @@ def test_a_budget_that_only_sound_keeps_reads_no_image(run: Run, monkeypatch: py
 
 
 def test_an_error_that_sound_promises_first_reads_no_image(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("experiments.contact_localization.accuracy.solving.heights_or_refusal", never)
+    monkeypatch.setattr("experiments.contact_localization.answer.heights_or_refusal", never)
     found = ask(run, front(0.01, 1e4), Target(error=5e-3))
     assert found.tried == (setting_name(AUDIO),)
     assert found.kept

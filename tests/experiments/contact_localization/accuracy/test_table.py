@@ -10,8 +10,8 @@ import pytest
 
 from experiments.contact_localization.accuracy import table
 from experiments.contact_localization.accuracy.benchmark_runs import Cell, cells, scene_of
-from experiments.contact_localization.accuracy.solving import read
 from experiments.contact_localization.accuracy.table import MEASUREMENT, METHODS
+from experiments.contact_localization.answer import read
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.baselines import mean_random_error

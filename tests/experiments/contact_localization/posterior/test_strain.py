@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy import solving
-from experiments.contact_localization.accuracy.solving import Readings, located
+from experiments.contact_localization import answer
+from experiments.contact_localization.answer import Readings, located
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.estimate import (
     MOST,
@@ -76,7 +76,7 @@ def test_a_strained_answer_is_made_again_under_errors_so_much_larger(
         asked.append((errors.tilt / USUAL.tilt, readings.prior.yaw_sigma / prior.yaw_sigma))
         return (replace(plain, strain=strain),)
 
-    monkeypatch.setattr(solving, "_located_at", at)
+    monkeypatch.setattr(answer, "_located_at", at)
     found = located(Readings((), (), block, prior, 0, (0.0, 0.0)), QUICK)[-1]
     expected = [(1.0, 1.0)] if times == 1.0 else [(1.0, 1.0), (times, times)]
     assert np.allclose(asked, expected)
@@ -94,7 +94,7 @@ def test_what_fits_no_place_at_other_levels_is_looked_at_again_at_the_default_on
             raise FitRefused("no place on this object explains the contacts")
         return (plain,)
 
-    monkeypatch.setattr(solving, "_located_at", at)
+    monkeypatch.setattr(answer, "_located_at", at)
     readings = Readings((), (), block, prior, 0, (0.0, 0.0))
     again, once = located(readings, QUICK)[-1], located(readings, usual)[-1]
     assert np.array_equal(again.position_in_object, once.position_in_object)
@@ -112,7 +112,7 @@ def test_what_fits_no_place_at_the_default_levels_is_refused_at_all(
         asked.append(accuracy)
         raise FitRefused("no place on this object explains the contacts")
 
-    monkeypatch.setattr(solving, "_located_at", at)
+    monkeypatch.setattr(answer, "_located_at", at)
     for accuracy in (QUICK, dials()):
         with pytest.raises(FitRefused):
             located(Readings((), (), block, prior, 0, (0.0, 0.0)), accuracy)

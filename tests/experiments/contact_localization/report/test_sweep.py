@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.accuracy.dials import accuracy_at
-from experiments.contact_localization.accuracy.solving import read
-from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.answer import Answer, read
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import METHOD, PARTICLES, ROUNDS, SPACING
 from experiments.contact_localization.posterior.estimate import locate
