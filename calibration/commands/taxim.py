@@ -1,16 +1,16 @@
 """``touchstone calibrate taxim``: a tactile camera from ball presses, by the arm or in pictures."""
 
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
-from calibration.commands.taxim_answer import answer_of, doubts, keep, say, scale_answer
-from calibration.commands.taxim_arm import PressRequest, chosen, pressed
-from calibration.commands.taxim_shadow import write_published
+from calibration.commands.taxim_answer import answer_of, doubts, keep, say, scale_answer, write_published
+from harness.basics.errors import WrongUse
 from harness.commands import options
-from harness.commands.output import emit, warn
+from harness.commands.output import CONSOLE, emit, resumable, step_progress, stopped, warn
 
 if TYPE_CHECKING:
     from calibration.taxim.arm.moves import ArmScale
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from calibration.taxim.mark_free import Identity
     from calibration.taxim.pictures import Channels, Pictures
     from harness.bench.sensor import TactileSensor
+    from harness.recording.recording import Recording
 
 _SAME_SHAPE = 0.02
 """Relative difference of the reductions along both sides, by rounding to whole pixels."""
@@ -246,11 +247,11 @@ def _read(
     source: Path, background: Path | None, channels: str | None
 ) -> "tuple[ArmPresses | None, ArmScale | None, Pictures]":
     """Pictures and, where an arm made them, what its moves say."""
-    from calibration.taxim.arm.record import is_arm_run, read_arm_run
+    from calibration.taxim.arm.record import NAME, read_arm_run
     from calibration.taxim.pictures import read_pictures
-    from harness.basics.errors import WrongUse
+    from harness.recording.recording import Recording
 
-    if not is_arm_run(source):
+    if not ((source / "run.json").is_file() and Recording(source).header.experiment == NAME):
         return None, None, read_pictures(source, background, _channels(channels))
     if background is not None or channels is not None:
         raise WrongUse("--background and --channels are of pictures; a run of the arm has both in its folder")
@@ -346,3 +347,114 @@ def _channels(text: str | None) -> "Channels | None":
             known: Channels = order
             return known
     raise WrongUse(f"--channels: no order {text!r}; there are {' and '.join(get_args(Channels))}")
+
+
+@dataclass(frozen=True)
+class PressRequest:
+    """What was asked for by options, None where nothing was."""
+
+    station: str | None
+    scene: Path | None
+    resume: Path | None
+    run: Path | None
+    presses: int | None
+    depth: float | None
+    ball_radius: float | None
+    seed: int | None
+    gap: str | None
+    bench: str | None
+
+    def require_none(self) -> None:
+        """Refuse options that only a new run of the arm can follow."""
+        names = ("scene", "run", "presses", "depth", "seed", "gap", "bench")
+        named = [f"--{name}" for name in names if vars(self)[name] is not None]
+        if named:
+            raise WrongUse(
+                f"{', '.join(named)}: they plan a new run of the arm; give --station, or leave them out"
+            )
+
+
+def chosen(folder: Path | None, wanted: PressRequest) -> None:
+    """Refuse anything but one of a folder, a station to move, or a run to go on with."""
+    ways = {"FOLDER": folder, "--station": wanted.station, "--resume": wanted.resume}
+    given = [name for name, value in ways.items() if value is not None]
+    if len(given) != 1:
+        raise WrongUse(
+            f"{' and '.join(given) or 'nothing'} given; give FOLDER (pictures, or a run that the arm made), "
+            "or --station NAME to press a ball with that bench's arm, or --resume RUN to go on with one"
+        )
+    if wanted.station is None:
+        wanted.require_none()
+
+
+def pressed(wanted: PressRequest, as_json: bool) -> Path | None:
+    """The folder of the run that the arm made or went on with; None where Ctrl-C ended it early."""
+    from calibration.taxim.arm.session import procedure
+    from harness.experiment.perform import describe_bench, perform_on_bench, steps_planned
+
+    recording, presses = _recording(wanted), procedure()
+    total = steps_planned(presses, recording)
+    if recording.committed < total:
+        CONSOLE.print(f"bench: {describe_bench(recording)}", markup=False)
+        CONSOLE.print(f"recording to {recording.folder}", markup=False)
+        how = f"touchstone calibrate taxim --resume {recording.folder}"
+        with (
+            recording.hold(),
+            resumable(how),
+            step_progress(recording.committed, total, presses.step) as told,
+        ):
+            done = perform_on_bench(presses, recording, told, say=told.say)
+        if not done.complete:
+            stopped(f"{presses.step} {recording.committed}", recording.folder, how, as_json)
+            return None
+    return recording.folder
+
+
+def _recording(wanted: PressRequest) -> "Recording":
+    from calibration.taxim.arm.record import NAME
+    from harness.experiment.lookup import require_of
+    from harness.recording.recording import Recording
+
+    if wanted.resume is not None:
+        recording = Recording(wanted.resume)
+        require_of(recording, NAME, "--resume")
+        return recording
+    return _begun(wanted)
+
+
+def _begun(wanted: PressRequest) -> "Recording":
+    from calibration.taxim.arm.plan import PressSettings
+    from calibration.taxim.arm.session import ball_scene, procedure
+    from harness.bench.scene import load_scene
+    from harness.bench.station_file import load_station, station_path
+    from harness.experiment.begin import begin
+    from harness.objects.targets import BALL_RADIUS
+
+    scene = None if wanted.scene is None else load_scene(wanted.scene)
+    radius = wanted.ball_radius
+    if radius is None:
+        if scene is None:
+            raise WrongUse("--ball-radius is missing: the radius of the ball on the table, as 2mm")
+        radius = BALL_RADIUS * scene.object.drawn_scale
+    usual = PressSettings()
+    settings = PressSettings(
+        presses=usual.presses if wanted.presses is None else wanted.presses,
+        depth=0.4 * radius if wanted.depth is None else wanted.depth,
+    )
+    station = load_station(station_path(wanted.station or ""))
+    with CONSOLE.status("planning the presses, rehearsing them in the twin"):
+        begun = begin(
+            procedure(settings),
+            ball_scene(radius, scene),
+            station,
+            wanted.seed,
+            wanted.gap,
+            wanted.run,
+            wanted.bench,
+        )
+    rehearsal = begun.plan.rehearsal
+    CONSOLE.print(
+        f"{settings.presses} presses of {1e3 * settings.depth:.2f} mm; rehearsed in the twin: "
+        f"{rehearsal.segments} motions, none refused; {len(rehearsal.warnings)} warnings"
+    )
+    return begun.recording

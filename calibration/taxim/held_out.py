@@ -1,33 +1,87 @@
-"""How well presses are predicted that a calibration has never seen: eight folds, press by press."""
+"""How well presses are predicted that a calibration has never seen: eight folds, press by press.
+
+``contact_circle`` finds the contact line of a ball in all presses at once. Laid over one another by their
+centres, the presses show one sharp line: along every ray from the centre the change of colour grows with the
+slope up to where the gel leaves the ball, and fades from there. A circle through those places says where the
+ball's axis is, whatever the lights do, and how large the contact is.
+
+``colour_misfit`` measures the error of the colours on presses that were left out. Every press is left out by
+one of the folds and compared with that fold's colours at its own refitted centre. What is left over has two
+parts. The camera's noise differs from pixel to pixel. The rest is alike from pixel to pixel, since the fit or
+the press is off as a whole, so that it adds up along a face. The covariance of pixels some way apart shows
+the second part alone.
+"""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d, map_coordinates
+from scipy.optimize import curve_fit
+from scipy.signal import correlate
 
-from calibration.taxim.arm.rest import rest_change
-from calibration.taxim.contact_circle import ContactCircle, contact_circle
+from calibration.taxim.arm.record import rest_change
 from calibration.taxim.light_fit import GelLight, fit_light, light_shades
-from calibration.taxim.pack import PressPack
+from calibration.taxim.pictures import PressPack
 from calibration.taxim.smooth_fit import (
+    WITH_OFFSET,
     Manner,
     SmoothFit,
     aligned,
+    ball_shades,
     contact_pixels,
     refined_centre,
     settled,
 )
-from calibration.taxim.table_fit import fit_table, table_shades
+from calibration.taxim.table import fit_table, table_shades
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
-from harness.sim.optics.tactile_calibration import Float32Array
+from harness.basics.errors import CalibrationRefused
+from harness.sim.optics.tactile_calibration import ColourMisfit, Float32Array
 
 FOLDS = 8
 WITHIN = 0.95
 """Of the median contact radius: the pixels that are scored."""
 
 PLAIN = Manner(rounds=5, place_ridge=1e-4, edge_again=True)
-OFFSET = Manner(offset=True, rounds=3, place_ridge=1e-4)
 
 _SETTLE = 12
+
+_RAYS = 48
+_FROM, _TO = 0.5, 1.15
+_STEPS = 66
+_BLUR = 2.0
+"""Steps of the radius, which are a hundredth of the ball."""
+
+_TURNS = 3
+_REWEIGHTED = 20
+_LARGEST = 0.99
+"""Ball radii: a contact line as large as the ball itself is not a contact line."""
+
+_NOISE = 2
+"""Pixels from which on a camera's noise, its colour filter's and its compression's share nothing."""
+
+_FARTHEST = 0.7
+"""Contact radii up to which the covariance is fitted: beyond, the refitted centre leaves little of it."""
+
+_FEWEST = 3
+"""Distances that are fitted, however small the contact."""
+
+_ALIKE = (0.03, 1.0)
+"""Sines of the slope between which the misfit's reach is looked for: a bin of the table, and every slope."""
+
+
+@dataclass(frozen=True)
+class ContactCircle:
+    """Where the presses' contact line lies about the centres that were assumed.
+
+    Attributes:
+        shift: ``(2,)`` pixels (column, row) from the assumed centres to the circle's.
+        radius: pixels.
+        scatter: pixels, how far the line strays from the circle (scaled median of the rays).
+    """
+
+    shift: FloatArray
+    radius: float
+    scatter: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,9 +141,9 @@ def teach(pack: PressPack, change: FloatArray, ball: float) -> FittedModel:
     rest = rest_change(pack, change)
     clean = change - rest
     slopes_alone, _ = aligned(pack, clean, ball, PLAIN)
-    loose, _ = aligned(replace(pack, centres=slopes_alone), clean, ball, OFFSET)
+    loose, _ = aligned(replace(pack, centres=slopes_alone), clean, ball, WITH_OFFSET)
     circle = contact_circle(clean, loose, ball)
-    fit = settled(pack, clean, loose + circle.shift, circle.radius, ball, OFFSET)
+    fit = settled(pack, clean, loose + circle.shift, circle.radius, ball, WITH_OFFSET)
     plain = settled(pack, clean, slopes_alone, circle.radius, ball, PLAIN)
     table, support = fit_table(pack, fit, ball, clean)
     bias = np.median(fit.centres - pack.centres, axis=0)
@@ -175,3 +229,121 @@ def _table_residual(
 ) -> tuple[IntArray, FloatArray]:
     place = contact_pixels(pack.shape, centre, radius, 1)
     return place, table_shades(table, centre, place, ball) - change[place[:, 0], place[:, 1]]
+
+
+def contact_circle(change: FloatArray, centres: FloatArray, ball: float) -> ContactCircle:
+    """The circle through the places of strongest change.
+
+    Args:
+        change: ``(presses, rows, columns, 3)`` grey levels against the untouched gel.
+        centres: ``(presses, 2)`` pixels (column, row), right but for a shift of all together.
+        ball: radius in pixels.
+
+    Raises:
+        CalibrationRefused: the line is no smaller than the ball.
+    """
+    shift = np.zeros(2)
+    for _ in range(_TURNS):
+        step, radius, scatter = _circle(*_line(change, centres + shift, ball))
+        shift = shift + step
+    if not radius < _LARGEST * ball:
+        raise CalibrationRefused(
+            f"the contact line has a radius of {radius:.1f} px and the ball one of {ball:.1f} px: no contact "
+            "is larger than the ball; check the ball's radius (not its diameter) and the pitch"
+        )
+    return ContactCircle(shift, radius, scatter)
+
+
+def _line(change: FloatArray, centres: FloatArray, ball: float) -> tuple[FloatArray, FloatArray]:
+    """Along every ray the radius of strongest change, ``(rays,)`` pixels, and the rays' angles."""
+    angles = 2.0 * np.pi * np.arange(_RAYS) / _RAYS
+    radii = np.linspace(_FROM, _TO, _STEPS) * ball
+    right, down = np.outer(np.cos(angles), radii), np.outer(np.sin(angles), radii)
+    seen = np.empty((len(change), _RAYS, _STEPS, 3))
+    for k, (x, y) in enumerate(centres):
+        for c in range(3):
+            map_coordinates(
+                change[k, ..., c], [y + down, x + right], seen[k, ..., c], order=1, mode="nearest"
+            )
+    typical = gaussian_filter1d(np.median(seen, axis=0), _BLUR, axis=1, mode="nearest")
+    strength = np.sqrt((typical**2).sum(axis=2))
+    best = np.clip(np.argmax(strength, axis=1), 1, _STEPS - 2)
+    before, there, after = (strength[np.arange(_RAYS), best + turn] for turn in (-1, 0, 1))
+    bend = np.minimum(before - 2.0 * there + after, -1e-12)
+    vertex = np.clip(0.5 * (before - after) / bend, -1.0, 1.0)
+    return radii[best] + vertex * (radii[1] - radii[0]), angles
+
+
+def _circle(radii: FloatArray, angles: FloatArray) -> tuple[FloatArray, float, float]:
+    """Centre, radius and scatter of a circle through most of the rays' ends; algebraic, reweighted."""
+    x, y = radii * np.cos(angles), radii * np.sin(angles)
+    weight = np.ones(len(x))
+    terms, squares = np.column_stack([x, y, np.ones_like(x)]), x**2 + y**2
+    for _ in range(_REWEIGHTED):
+        solved = np.linalg.lstsq(terms * weight[:, None], squares * weight, rcond=None)[0]
+        centre = 0.5 * solved[:2]
+        radius = float(np.sqrt(max(float(solved[2] + centre @ centre), 0.0)))
+        off = np.hypot(x - centre[0], y - centre[1]) - radius
+        scatter = 1.4826 * float(np.median(np.abs(off)))
+        weight = 1.0 / (1.0 + (off / max(1.5 * scatter, 1e-6)) ** 2)
+    return np.asarray(centre, dtype=np.float64), radius, scatter
+
+
+def colour_misfit(
+    pack: PressPack, change: FloatArray, out: HeldOut, ball: float, radius: float
+) -> ColourMisfit:
+    """The smooth part of what held-out presses leave over.
+
+    Args:
+        pack: the presses.
+        change: ``(presses, rows, columns, 3)`` grey levels against the background, drift removed.
+        out: of the same presses: the folds and the centres.
+        ball: radius in pixels.
+        radius: pixels about a press's centre that are compared.
+    """
+    left: list[tuple[FloatArray, FloatArray]] = []
+    for model, _, left_out in out.folds:
+        for k in left_out:
+            place = contact_pixels(pack.shape, out.centres[k], radius, 1)
+            seen = (change[k] - model.rest)[place[:, 0], place[:, 1]]
+            shown = ball_shades(pack, out.centres[k], place, model.fit.colours, ball)
+            left.append(_products(place, shown - seen, int(2.0 * radius) + 2))
+    total, pairs = (np.sum(part, axis=0) for part in zip(*left, strict=True))
+    covariance = np.asarray(total / np.maximum(pairs, 1.0))
+    return _fitted(covariance, pairs, ball, max(_FARTHEST * radius, _NOISE + _FEWEST - 1))
+
+
+def _products(place: IntArray, left: FloatArray, reach: int) -> tuple[FloatArray, FloatArray]:
+    """``(reach,)`` by distance in pixels: sums of products of pixels so far apart, and how many pairs."""
+    row, column = (place - place.min(axis=0)).T
+    there = np.zeros((row.max() + 1, column.max() + 1))
+    there[row, column] = 1.0
+    total = np.zeros([2 * side - 1 for side in there.shape])
+    for channel in left.T:
+        picture = np.zeros(there.shape)
+        picture[row, column] = channel
+        total += correlate(picture, picture, method="fft") / 3.0
+    down, right = np.indices(total.shape) - (np.array(there.shape) - 1)[:, None, None]
+    apart = np.minimum(np.rint(np.hypot(down, right)).astype(np.int64), reach - 1).ravel()
+    pairs = correlate(there, there, method="fft")
+    of_products, of_pairs = (np.bincount(apart, each.ravel(), reach) for each in (total, pairs))
+    return of_products.astype(np.float64), of_pairs.astype(np.float64)
+
+
+def _fitted(covariance: FloatArray, pairs: FloatArray, ball: float, farthest: float) -> ColourMisfit:
+    apart = np.arange(_NOISE, int(farthest) + 1)
+    sine, seen = apart / ball, covariance[apart]
+    (variance, alike), _ = curve_fit(
+        _covariance,
+        sine,
+        seen,
+        p0=(max(float(seen[0]), 1e-3), 0.2),
+        sigma=1.0 / np.sqrt(np.maximum(pairs[apart], 1.0)),
+        bounds=([0.0, _ALIKE[0]], [np.inf, _ALIKE[1]]),
+    )
+    return ColourMisfit(float(np.sqrt(variance)), float(alike))
+
+
+def _covariance(apart: FloatArray, variance: float, alike: float) -> FloatArray:
+    """Of white noise under a Gaussian of sigma ``alike``, brought to ``variance``."""
+    return np.asarray(variance * np.exp(-((apart / (2.0 * alike)) ** 2)))

@@ -13,14 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.taxim.moments import SLOPES, ColourTerms, colour_terms, place_products
-from calibration.taxim.pack import PressPack
+from calibration.taxim.pictures import PressPack
 from calibration.taxim.smooth_fit import distance, huber, scaled_place
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import CalibrationRefused
 from harness.sim.gel.gel import GelLevel, GelSkirt, deform
 from harness.sim.optics import lit_calibration
 from harness.sim.optics.shading import KNEE, POSITION_TERMS
-from harness.sim.optics.tactile_calibration import smooth_terms
 
 REACH = 4.0
 """Contact radii from the centre that are looked at; in the published sets the skirt ends at 3.5."""
@@ -149,13 +148,6 @@ def pressed_ball(away: FloatArray, depth: float, ball: float) -> FloatArray:
     return reached
 
 
-def per_metre(lit: FloatArray, pitch: float) -> FloatArray:
-    """The coefficients with the light in grey levels a metre instead of a pixel of ``pitch`` metres."""
-    scaled = lit.copy()
-    scaled[smooth_terms() :] /= pitch
-    return scaled
-
-
 def light_shades(pack: PressPack, light: GelLight, centre: FloatArray, place: IntArray) -> FloatArray:
     """``(n, 3)`` grey levels that contact and skirt of a press give pixels ``(n, 2)``, row and column."""
     places = place_products(scaled_place(pack, place))
@@ -202,7 +194,11 @@ def _solved(
     weight = fixed
     for _ in range(turns):
         gram, right = terms.normal_equations(weight, samples.seen)
-        lit = np.asarray(np.linalg.solve(gram + np.diag(_ridge(np.diag(gram))), right), dtype=np.float64)
+        diagonal = np.diag(gram)
+        degrees = np.array([c + d for c in range(3) for d in range(3 - c)], dtype=np.float64)
+        constants = diagonal.reshape(-1, POSITION_TERMS)[:, :1]
+        ridge: FloatArray = _RIDGE * diagonal + (_PLACE_RIDGE * constants * degrees**2).ravel()
+        lit = np.asarray(np.linalg.solve(gram + np.diag(ridge), right), dtype=np.float64)
         left = terms.shades(lit) - samples.seen
         weight = fixed * huber(left)
     rms = float(np.sqrt((fixed * np.mean(left**2, axis=1)).sum() / fixed.sum()))
@@ -213,24 +209,11 @@ def _terms(profile: RadialProfile, offset: FloatArray, places: FloatArray, limit
     away: FloatArray = np.hypot(offset[:, 0], offset[:, 1])
     radii = np.arange(len(profile.sine), dtype=np.float64)
     slope: FloatArray = np.interp(away, radii, profile.sine, right=0.0)
-    sine = _softly_limited(slope, limit)
+    knee, room = KNEE * limit, (1.0 - KNEE) * limit
+    sine: FloatArray = np.where(
+        slope <= knee, slope, knee + room * (1.0 - np.exp(-np.maximum(slope - knee, 0.0) / room))
+    )
     height: FloatArray = np.interp(away, radii, profile.height, right=0.0)
     normal = offset * (sine / np.maximum(away, 1e-9))[:, None]
     light = tuple((a, b, 1) for a, b in lit_calibration.LIGHT_POWERS)
     return colour_terms(SLOPES + light, normal, places, height)
-
-
-def _softly_limited(sine: FloatArray, limit: float) -> FloatArray:
-    """As ``harness.sim.optics.shading.softly_limited``, of many."""
-    knee, room = KNEE * limit, (1.0 - KNEE) * limit
-    bent: FloatArray = np.where(
-        sine <= knee, sine, knee + room * (1.0 - np.exp(-np.maximum(sine - knee, 0.0) / room))
-    )
-    return bent
-
-
-def _ridge(diagonal: FloatArray) -> FloatArray:
-    degrees = np.array([c + d for c in range(3) for d in range(3 - c)], dtype=np.float64)
-    constants = diagonal.reshape(-1, POSITION_TERMS)[:, :1]
-    ridge: FloatArray = _RIDGE * diagonal + (_PLACE_RIDGE * constants * degrees**2).ravel()
-    return ridge

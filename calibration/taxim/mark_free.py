@@ -1,6 +1,6 @@
 """Calibrate a tactile camera from pictures of ball presses alone: nobody marks anything.
 
-Presses are found (``detect``), damaged ones refused with their reason (``gates``), colours and centres
+Presses are found and damaged ones refused with their reason (``gates``), colours and centres
 fitted in turns (``smooth_fit``), and the result scored on presses left out (``held_out``). A ball's known
 radius turns a place within a contact into a slope; the radius of the contact line is its depth.
 """
@@ -11,29 +11,40 @@ from time import perf_counter
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from calibration.taxim.artefact import calibration_of
-from calibration.taxim.colour_misfit import colour_misfit
-from calibration.taxim.explained import contact_radius, too_large, unexplained
 from calibration.taxim.gates import CONTACT, LEAST_PRESSES, check_set, reached, refusals, sightings
-from calibration.taxim.held_out import WITHIN, FittedModel, Score, held_out, teach
-from calibration.taxim.likeness import check_order
-from calibration.taxim.pack import PressPack
-from calibration.taxim.pictures import Pictures, Refused, in_order_of_content
-from calibration.taxim.shadow.fit import ShadowFit, fit_shadow
-from calibration.taxim.shadow.score import ShadowScore, score_shadow
-from calibration.taxim.smooth_fit import changes
-from calibration.taxim.table_error import table_error
-from harness.basics.arrays import FloatArray, IntArray, read_only
+from calibration.taxim.held_out import WITHIN, FittedModel, Score, colour_misfit, decibels, held_out, teach
+from calibration.taxim.pictures import Pictures, PressPack, Refused, in_order_of_content
+from calibration.taxim.shadow import ShadowFit, ShadowScore, fit_shadow, score_shadow
+from calibration.taxim.smooth_fit import changes, residual, strength_by_radius
+from calibration.taxim.table import table_error
+from harness.basics.arrays import ByteArray, FloatArray, IntArray, read_only
 from harness.basics.errors import CalibrationRefused
 from harness.picture.square_pixels import MADE_SQUARE
 from harness.sim.optics.lit_calibration import LitCalibration, with_shadow
-from harness.sim.optics.tactile_calibration import ColourMisfit, Float32Array, TactileCalibration
+from harness.sim.optics.shading import design
+from harness.sim.optics.tactile_calibration import (
+    CalibrationHeader,
+    ColourMisfit,
+    Float32Array,
+    TactileCalibration,
+    smooth_terms,
+)
 
 LEAST_GAIN = 12.0
 """dB over predicting nothing that presses left out must gain in the median; published sets gain 19."""
 
 _SMALLEST_BALL = 5.0
 """Pixels of radius."""
+
+LEAST_OWN_GAIN = 6.0
+"""dB that a press must gain in its own fit: less than half of its change explained away is not the ball's."""
+
+_TURNS = 24
+_SLOPE = 0.4
+"""Sine of the slope at which colours are compared; every press reaches it."""
+
+_CLEAR = 0.1
+"""By which the correlations of the two orders must differ for either to be believed."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +90,13 @@ class UsedPress:
     radius: float
     depth: float
     score: Score
+
+
+def contact_radius(clean: FloatArray, centre: FloatArray, ball: float) -> float:
+    """Pixels from the centre at which one press changes the colour most."""
+    rings = strength_by_radius(clean, centre, ball)
+    smooth = np.convolve(rings, (0.25, 0.5, 0.25), mode="valid")
+    return float(np.argmax(smooth)) + 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,3 +309,121 @@ def _artefact(
     if shadow is None or table is None:
         return scored
     return with_shadow(scored, table, shadow.rim * identity.pitch)
+
+
+def calibration_of(
+    background: ByteArray,
+    model: FittedModel,
+    identity: "Identity",
+    made_from: str,
+    error: Float32Array | None = None,
+) -> LitCalibration:
+    """The artefact of a model, which says nothing of its quality yet.
+
+    Args:
+        background: ``(rows, columns, 3)`` RGB of the untouched gel, before the presses corrected it.
+        model: of the presses.
+        identity: pitch, ball and names.
+        made_from: in words.
+        error: of the table's colours, see ``table_error``; None where it was not asked for.
+    """
+    header = CalibrationHeader(
+        sensor=identity.sensor,
+        serial=identity.serial,
+        date=identity.date,
+        made_from=made_from,
+        licence=identity.licence,
+        pitch=identity.pitch,
+        ball_radius=identity.ball_radius,
+        slope_limit=model.plain.edge / identity.ball,
+        held_out_db=0.0,
+        held_out_table_db=0.0,
+        residual_rms=model.plain.residual_rms,
+        condition=model.plain.condition,
+        skirt=model.light.skirt,
+    )
+    seen = np.clip(np.round(background + model.rest), 0.0, 255.0).astype(np.uint8)
+    lit = model.light.lit.copy()
+    lit[smooth_terms() :] /= identity.pitch  # the light in grey levels a metre instead of a pixel
+    made = LitCalibration(header, seen, model.table, model.support, model.plain.colours, lit)
+    return made if error is None else replace(made, uncertainty=error)
+
+
+def too_large(name: str, radius: float, ball: float, what: str) -> Refused | None:
+    """Refuse a press whose ``what`` is no smaller than the ball; both in pixels."""
+    if radius < ball:
+        return None
+    return Refused(
+        name,
+        "radius",
+        f"{what} has a radius of {radius:.1f} px and the ball one of {ball:.1f} px: no contact is larger "
+        "than the ball; check the ball, the pitch, and what was pressed",
+    )
+
+
+def unexplained(
+    pack: PressPack, change: FloatArray, model: FittedModel, ball: float, names: list[str]
+) -> dict[int, Refused]:
+    """Presses that are not this ball after all, by their place in the pack."""
+    worse: dict[int, Refused] = {}
+    for k, name in enumerate(names):
+        centre, clean = model.fit.centres[k], change[k] - model.rest
+        radius = contact_radius(clean, centre, ball)
+        large = too_large(name, radius, ball, "its contact")
+        edge = WITHIN * model.fit.edge
+        left = residual(pack, clean, centre, model.fit.colours, edge, ball)
+        nothing = residual(pack, clean, centre, np.zeros_like(model.fit.colours), edge, ball)
+        gain = decibels(left) - decibels(nothing)
+        if large is not None:
+            worse[k] = large
+        elif gain < LEAST_OWN_GAIN:
+            worse[k] = Refused(
+                name,
+                "not explained",
+                f"the other presses' colours explain it by {gain:.1f} dB only (at least {LEAST_OWN_GAIN:g}): "
+                "another object, a slip, or dirt; press again",
+            )
+    return worse
+
+
+def check_order(smooth: FloatArray, like: TactileCalibration) -> None:
+    """Refuse presses whose red and blue are exchanged against a calibration of the same make.
+
+    Presses and background saved alike in the wrong order contradict nothing among themselves.
+
+    Args:
+        smooth: ``(120, 3)`` coefficients of the new presses.
+        like: calibrated from pictures known to be right, the camera mounted the same way.
+
+    Raises:
+        CalibrationRefused: exchanged, or unlike in either order.
+    """
+    if len(like.smooth) == 0:
+        raise CalibrationRefused(
+            "the calibration to compare with has only a table; give one with a smooth model"
+        )
+    ours, theirs = _wheel(smooth), _wheel(like.smooth)
+    straight, crossed = _correlation(ours, theirs), _correlation(ours[:, ::-1], theirs)
+    if crossed > straight + _CLEAR:
+        raise CalibrationRefused(
+            f"colours correlate with {like.header.sensor} by {straight:.2f} as they are and by {crossed:.2f} "
+            "with red and blue exchanged: the pictures are in the wrong order; say --channels bgr (or rgb)"
+        )
+    if straight < crossed + _CLEAR:
+        raise CalibrationRefused(
+            f"colours correlate with {like.header.sensor} by {straight:.2f} as they are and by {crossed:.2f} "
+            "with red and blue exchanged: too close to tell the order; compare with a sensor of the same make"
+        )
+
+
+def _wheel(smooth: FloatArray) -> FloatArray:
+    """``(turns, 3)`` grey levels of slopes all around, in the middle of the picture."""
+    turns = 2.0 * np.pi * np.arange(_TURNS) / _TURNS
+    normals = _SLOPE * np.column_stack([np.cos(turns), np.sin(turns)])
+    shown: FloatArray = design(normals, np.zeros((_TURNS, 2))) @ smooth
+    return shown
+
+
+def _correlation(one: FloatArray, other: FloatArray) -> float:
+    left, right = (part - part.mean(axis=0) for part in (one, other))
+    return float((left * right).sum() / max(float(np.sqrt((left**2).sum() * (right**2).sum())), 1e-12))

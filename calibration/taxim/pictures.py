@@ -9,9 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from calibration.taxim.pack import read_pack
-from harness.basics.arrays import ByteArray, FloatArray, read_only
+from harness.basics.arrays import ByteArray, FloatArray, IntArray, read_only
 from harness.basics.errors import CalibrationRefused, WrongUse
+from harness.basics.npz_file import read_arrays
 from harness.picture.image_file import read_image
 from harness.picture.square_pixels import made_square, square_places
 
@@ -21,6 +21,8 @@ PACK = "dataPack.npz"
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 REST_NAMES = ("background", "bg", "f0", "ref", "reference", "rest", "untouched", "no_contact")
 """Names of a file, without its ending, that say it shows the untouched gel."""
+
+_KEYS = {"f0", "imgs", "touch_center", "touch_radius"}
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ def read_pictures(path: Path, background: Path | None = None, channels: Channels
         raise WrongUse(f"{path} is no folder and no {PACK}; name the folder of the press pictures")
     files = [file for file in sorted(path.iterdir()) if file.suffix.lower() in SUFFIXES]
     rest = background or next((file for file in files if file.stem.lower() in REST_NAMES), None)
-    presses = [file for file in files if rest is None or not _same(file, rest)]
+    presses = [file for file in files if rest is None or not (rest.exists() and file.samefile(rest))]
     if not presses:
         raise CalibrationRefused(
             f"{path} holds no pictures ({', '.join(SUFFIXES)}) and no {PACK}; put one picture a press into it"
@@ -181,7 +183,7 @@ def _together(
     images = np.stack(kept)
     if rest is None:
         rest, whence = (
-            _median(images),
+            np.asarray(np.round(np.median(images, axis=0)), dtype=np.uint8),
             "the presses' own median, for no picture of the untouched gel was given",
         )
     return Pictures(
@@ -196,16 +198,8 @@ def _together(
     )
 
 
-def _median(images: ByteArray) -> ByteArray:
-    return np.asarray(np.round(np.median(images, axis=0)), dtype=np.uint8)
-
-
 def _ordered(image: ByteArray, channels: Channels) -> ByteArray:
     return image if channels == "rgb" else np.ascontiguousarray(image[..., ::-1])
-
-
-def _same(one: Path, other: Path) -> bool:
-    return other.exists() and one.samefile(other)
 
 
 def digest(image: ByteArray) -> str:
@@ -217,3 +211,69 @@ def set_digest(rest: ByteArray, images: ByteArray) -> str:
     """Hash of a background and its presses, whatever their order."""
     every = "".join([digest(rest), *sorted(digest(image) for image in images)])
     return hashlib.sha256(every.encode()).hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class PressPack:
+    """Pictures of one ball pressed into one gel at many places.
+
+    Attributes:
+        background: ``(rows, columns, 3)`` RGB, of the untouched gel.
+        images: ``(presses, rows, columns, 3)`` RGB.
+        centres: ``(presses, 2)`` pixels (column, row), marked by hand.
+        radii: ``(presses,)`` pixels, of the marked circles.
+        number: ``(presses,)`` of each press in the file it came from, from 0.
+        sha256: of that file.
+    """
+
+    background: ByteArray
+    images: ByteArray
+    centres: FloatArray
+    radii: FloatArray
+    number: IntArray
+    sha256: str
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the pictures."""
+        return self.background.shape[0], self.background.shape[1]
+
+    def of(self, chosen: IntArray) -> "PressPack":
+        """Only the presses at these places of the pack."""
+        return PressPack(
+            self.background,
+            read_only(self.images[chosen]),
+            read_only(self.centres[chosen]),
+            read_only(self.radii[chosen]),
+            read_only(self.number[chosen]),
+            self.sha256,
+        )
+
+
+def read_pack(path: Path) -> PressPack:
+    """Read a ``dataPack.npz``.
+
+    The files hold what ``cv2.imread`` gave, blue first; it is turned to RGB here and nowhere else.
+
+    Raises:
+        CalibrationRefused: missing, incomplete, or shapes that disagree.
+    """
+    found = read_arrays(path, "a pack of presses", _KEYS)
+    images, presses = found["imgs"], len(found["imgs"])
+    shapes_agree = (
+        images.shape[1:] == found["f0"].shape
+        and found["touch_center"].shape == (presses, 2)
+        and found["touch_radius"].shape == (presses,)
+    )
+    if not shapes_agree or images.dtype != np.uint8 or images.ndim != 4 or images.shape[3] != 3:
+        raise CalibrationRefused(
+            f"{path}: images {images.dtype} {images.shape} and marks do not belong together"
+        )
+    return PressPack(
+        read_only(np.ascontiguousarray(found["f0"][..., ::-1])),
+        read_only(np.ascontiguousarray(images[..., ::-1])),
+        read_only(found["touch_center"].astype(np.float64)),
+        read_only(found["touch_radius"].astype(np.float64)),
+        read_only(np.arange(presses)),
+        hashlib.sha256(path.read_bytes()).hexdigest(),
+    )

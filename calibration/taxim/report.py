@@ -7,18 +7,22 @@ from typing import Any
 import numpy as np
 
 from calibration.taxim.arm.moves import ArmScale
-from calibration.taxim.arm.record import ArmPresses
-from calibration.taxim.arm.rest import AWAY, SIGHTINGS
+from calibration.taxim.arm.record import AWAY, SIGHTINGS, ArmPresses
 from calibration.taxim.light_fit import depth_of, pressed_ball
 from calibration.taxim.mark_free import MarkFree, UsedPress
 from calibration.taxim.pictures import Pictures
-from calibration.taxim.shadow.polar import SAMPLE_STEP
+from calibration.taxim.shadow import SAMPLE_STEP
 from calibration.taxim.smooth_fit import distance
 from harness.basics.arrays import ByteArray, FloatArray
-from harness.report.figures.bins import bins_figure
 from harness.report.figures.figures import Album, Picture
-from harness.report.figures.presses import LONGER, maps_figure, moves_figure, scores_figure
-from harness.report.figures.shadow import shadow_figure
+from harness.report.figures.presses import (
+    LONGER,
+    bins_figure,
+    maps_figure,
+    moves_figure,
+    scores_figure,
+    shadow_figure,
+)
 from harness.report.figures.tiles import DIFFERENCE_GAIN, difference, png
 from harness.report.template import write_page
 from harness.sim.gel.gel import deform

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.taxim.moments import OFFSET, SLOPES, colour_terms, place_products
-from calibration.taxim.pack import PressPack
+from calibration.taxim.pictures import PressPack
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import CalibrationRefused
 from harness.sim.optics.lit_calibration import place_terms
@@ -57,6 +57,10 @@ class Manner:
     rounds: int = 6
     place_ridge: float = 1e-3
     edge_again: bool = False
+
+
+WITH_OFFSET = Manner(offset=True, rounds=3, place_ridge=1e-4)
+"""Of presses found without marks, a contact's offset included."""
 
 
 @dataclass(frozen=True, eq=False)

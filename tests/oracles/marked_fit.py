@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from calibration.taxim.held_out import decibels
-from calibration.taxim.pack import PressPack, read_pack
+from calibration.taxim.pictures import PressPack, read_pack
 from calibration.taxim.smooth_fit import (
     Manner,
     SmoothFit,
@@ -19,7 +19,7 @@ from calibration.taxim.smooth_fit import (
     residual,
     settled,
 )
-from calibration.taxim.table_fit import fit_table, table_shades
+from calibration.taxim.table import fit_table, table_shades
 from harness.basics.arrays import IntArray
 from harness.basics.errors import CalibrationRefused, WrongUse
 from harness.sim.optics.tactile_calibration import (

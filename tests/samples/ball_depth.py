@@ -5,13 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from calibration.taxim.artefact import calibration_of
-from calibration.taxim.colour_misfit import colour_misfit
 from calibration.taxim.gates import CONTACT, check_set, refusals, sightings
-from calibration.taxim.held_out import held_out, teach
-from calibration.taxim.mark_free import Identity
-from calibration.taxim.pack import PressPack
-from calibration.taxim.pictures import Pictures
+from calibration.taxim.held_out import colour_misfit, held_out, teach
+from calibration.taxim.mark_free import Identity, calibration_of
+from calibration.taxim.pictures import Pictures, PressPack
 from calibration.taxim.smooth_fit import changes
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.sim.optics.inverse_error import HeightErrors

@@ -7,14 +7,12 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
-from calibration.taxim.artefact import calibration_of
 from calibration.taxim.gates import CONTACT, check_set, refusals, sightings
 from calibration.taxim.held_out import FOLDS, WITHIN, FittedModel, decibels, teach
 from calibration.taxim.light_fit import depth_of, pressed_ball
-from calibration.taxim.mark_free import Identity
-from calibration.taxim.pack import PressPack
-from calibration.taxim.pictures import Pictures, read_pictures
-from calibration.taxim.shadow.fit import fit_shadow
+from calibration.taxim.mark_free import Identity, calibration_of
+from calibration.taxim.pictures import Pictures, PressPack, read_pictures
+from calibration.taxim.shadow import fit_shadow
 from calibration.taxim.smooth_fit import changes, distance, refined_centre
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray, IntArray, read_only
 from harness.picture.image_metrics import ssim

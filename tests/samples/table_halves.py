@@ -7,10 +7,9 @@ from threadpoolctl import threadpool_limits
 
 from calibration.taxim.held_out import FittedModel, teach
 from calibration.taxim.mark_free import Identity
-from calibration.taxim.pack import PressPack
-from calibration.taxim.pictures import Pictures, in_order_of_content
+from calibration.taxim.pictures import Pictures, PressPack, in_order_of_content
 from calibration.taxim.smooth_fit import changes
-from calibration.taxim.table_error import table_error
+from calibration.taxim.table import table_error
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 
 

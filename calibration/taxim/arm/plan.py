@@ -130,12 +130,6 @@ class PressPlan:
         }
 
 
-def settings_of(plan: dict[str, Any]) -> PressSettings:
-    """The settings in a run's plan."""
-    told = dict(plan["settings"])
-    return PressSettings(**{**told, "still": Stillness(**told["still"])})
-
-
 def _order(plan: PressPlan) -> Iterator[tuple[Literal["background", "press"], PressMotion]]:
     """Presses, and the untouched gel before the first, after the last, and every so often."""
     for k, motion in enumerate(plan.motions):

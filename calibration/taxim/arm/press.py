@@ -4,17 +4,30 @@ A ball of two millimetres pushes back by a tenth of a newton, which no force sen
 from nothing. The picture does: it shows a ball that is a few hundredths of a millimetre deep.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
-from calibration.taxim.arm.channels import DESCENT, STATE, UNREST, UNTOUCHED, WAY
-from calibration.taxim.arm.plan import PressMotion, PressSettings, settings_of
-from calibration.taxim.arm.settled import Settling, look, settle
-from calibration.taxim.arm.watch import PressWatch, touch_seen
+from calibration.taxim.arm.plan import PressMotion, PressSettings
+from calibration.taxim.arm.record import (
+    DESCENT,
+    IMAGE,
+    STATE,
+    UNREST,
+    UNTOUCHED,
+    WAY,
+    changed,
+    press_name,
+    why_not,
+)
+from calibration.taxim.arm.settled import Settling, Stillness, look, settle
+from calibration.taxim.gates import MOST_DRIFT, refusals, sightings
+from calibration.taxim.pictures import Pictures, Refused
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import BenchFault, NotTouched
+from harness.basics.errors import BenchFault, CalibrationRefused, NotTouched
 from harness.bench.reading import Channel, Reading
 from harness.bench.station import PRESS, Bench
 from harness.bench.travel import Trajectory, travel
@@ -27,7 +40,6 @@ AT_REST = 0.2
 MISSES = 3
 """Presses in a row that met nothing, after which the ball is taken to be somewhere else."""
 
-
 _TRAVEL, _TRAVEL_ACCELERATION = 0.9, 1.2
 """rad/s and rad/s^2 of the fastest joint between presses."""
 
@@ -36,6 +48,11 @@ _APPROACH, _PRESS = 0.040, 0.005
 
 _ACCELERATION = 0.2
 """m/s^2 of every straight line."""
+
+EARLY = 8
+"""Presses after which it is asked whether most are refused."""
+
+_BLUR = 1.0
 
 
 class BallPresses:
@@ -61,7 +78,8 @@ class BallPresses:
             NotTouched: several presses in a row met nothing.
             CalibrationRefused: most presses so far are refused, or light or gel have drifted.
         """
-        self._settings = settings_of(dict(recording.header.plan))
+        told = dict(recording.header.plan["settings"])
+        self._settings = PressSettings(**{**told, "still": Stillness(**told["still"])})
         self._watch = PressWatch.of(recording, self._ball)
         for index, planned in enumerate(recording.planned("steps")):
             if index >= recording.committed:
@@ -107,9 +125,11 @@ class BallPresses:
         history = bench.arm.history(AT_REST)
         self._back(bench, motion)
         descent = (_joined(DESCENT, seen), _way(seen, way)) if touched else ()
+        channel = replace(rest.frames.channel, name=UNTOUCHED)
+        untouched = Reading(channel, rest.frames.times, rest.frames.values, rest.frames.encoded)
         return (
             pressed.frames,
-            _renamed(UNTOUCHED, rest.frames),
+            untouched,
             *descent,
             *_numbers(pressed, touched),
             *history,
@@ -141,7 +161,8 @@ class BallPresses:
         self._to(bench, motion, down, _APPROACH)
         while down <= last and len(seen) < wanted.pictures:
             # The frame before the last may have been exposed while the arm still moved.
-            frame = _last(bench.gel.read(2, wanted.still.timeout))
+            frames = bench.gel.read(2, wanted.still.timeout)
+            frame = Reading(frames.channel, frames.times[-1:], frames.values[-1:], frames.encoded[-1:])
             if seen or touch_seen(look(frame) - rest) >= wanted.notice:
                 seen.append(frame)
                 way.append(down)
@@ -181,16 +202,116 @@ def _way(seen: list[Reading], way: list[float]) -> Reading:
     return Reading(Channel(WAY, "m", (), "float64"), times, np.array(way))
 
 
-def _last(frames: Reading) -> Reading:
-    return Reading(frames.channel, frames.times[-1:], frames.values[-1:], frames.encoded[-1:])
-
-
-def _renamed(name: str, frames: Reading) -> Reading:
-    channel = replace(frames.channel, name=name)
-    return Reading(channel, frames.times, frames.values, frames.encoded)
-
-
 def _joined(name: str, seen: list[Reading]) -> Reading:
     channel = replace(seen[0].channel, name=name)
     times, values = (np.concatenate([getattr(one, part) for one in seen]) for part in ("times", "values"))
     return Reading(channel, times, values, tuple(frame for one in seen for frame in one.encoded))
+
+
+def touch_seen(change: FloatArray) -> float:
+    """Grey levels of the strongest change of one picture against the untouched gel, noise blurred away."""
+    blurred = gaussian_filter(change, (_BLUR, _BLUR, 0.0))
+    return float(np.abs(blurred).max())
+
+
+class PressWatch:
+    """What the presses so far say of the next ones.
+
+    Args:
+        ball: radius in pixels, by the stated pitch.
+
+    Attributes:
+        first: ``(rows, columns, 3)`` grey levels, the first picture of the untouched gel; None before it.
+    """
+
+    def __init__(self, ball: float) -> None:
+        self._ball = ball
+        self.first: FloatArray | None = None
+        self._offsets: list[float] = []
+        self._verdicts: list[Refused | None] = []
+
+    @classmethod
+    def of(cls, recording: Recording, ball: float) -> "PressWatch":
+        """As it was after the steps that are on the disk."""
+        watch = cls(ball)
+        for record in recording.steps():
+            watch.seen(record.step, record.readings)
+        return watch
+
+    @property
+    def offset(self) -> float | None:
+        """M by which the ball is met later than the scene says; None before it was met."""
+        return float(np.median(self._offsets)) if self._offsets else None
+
+    def require_light(self, rest: FloatArray) -> None:
+        """Refuse to go on where the light is no longer what it was.
+
+        Raises:
+            CalibrationRefused: the untouched gel as a whole has changed too much since the first background.
+        """
+        if self.first is None:
+            return
+        whole, _ = changed(self.first, rest)
+        if whole > MOST_DRIFT:
+            raise CalibrationRefused(
+                f"drift: the untouched gel changed by {whole:.0f} grey levels since the first background (at "
+                f"most {MOST_DRIFT:.0f}): fix exposure and white balance; if the light comes back go on with "
+                "--resume, else begin again"
+            )
+
+    def require_sense(self, misses: int) -> None:
+        """Refuse to go on pressing in vain.
+
+        Raises:
+            NotTouched: the last ``misses`` presses met nothing.
+            CalibrationRefused: more than half of the presses, eight or more, are refused.
+        """
+        last = self._verdicts[-misses:]
+        if len(last) == misses and all(one is not None and one.kind == "no contact" for one in last):
+            raise NotTouched(
+                f"the last {misses} presses met nothing: check that the ball stands where the scene's "
+                "[object.pose] says, to a millimetre and a half of its height, then begin again"
+            )
+        refused = [one for one in self._verdicts if one is not None]
+        if len(self._verdicts) >= EARLY and 2 * len(refused) > len(self._verdicts):
+            kind, count = Counter(one.kind for one in refused).most_common(1)[0]
+            example = next(one for one in refused if one.kind == kind)
+            raise CalibrationRefused(
+                f"{len(refused)} of {len(self._verdicts)} presses are refused, {count} as '{kind}', so the "
+                f"others are not made; {example.name}: {example.reason}"
+            )
+
+    def seen(self, step: Step, readings: Mapping[str, Reading]) -> str:
+        """Take in a step, performed now or read back; what it showed, in words."""
+        if step.kind == "background":
+            return self._background(look(readings[IMAGE]))
+        motion = PressMotion.from_parameters(dict(step.parameters))
+        if WAY in readings:
+            self._offsets.append(float(readings[WAY].values[0]) - motion.touch)
+        verdict, said = self._verdict(step, readings)
+        self._verdicts.append(verdict)
+        return said if verdict is None else f"refused, {verdict.kind}: {verdict.reason}"
+
+    def _background(self, rest: FloatArray) -> str:
+        if self.first is None:
+            self.first = rest
+            return "the untouched gel"
+        whole, place = changed(self.first, rest)
+        return f"the untouched gel: {whole:.1f} grey levels from the first, {place:.1f} at one place"
+
+    def _verdict(self, step: Step, readings: Mapping[str, Reading]) -> tuple[Refused | None, str]:
+        name = press_name(step.index)
+        touched, settled, seconds = (float(value) for value in readings[STATE].values[-1])
+        unrest = float(readings[UNREST].values[-1]) if UNREST in readings else 0.0
+        refused = why_not(name, bool(touched), bool(settled), unrest, seconds)
+        if refused is not None:
+            return refused, ""
+        background, image = (
+            np.asarray(np.round(one), dtype=np.uint8)
+            for one in (look(readings[UNTOUCHED]), look(readings[IMAGE]))
+        )
+        pictures = Pictures(background, "", image[None], (name,), None, name, "")
+        sighting = sightings(pictures, self._ball)
+        x, y = sighting[0].found.centre
+        verdict = refusals(pictures, sighting, self._ball)[0]
+        return verdict, f"ball at ({x:.0f}, {y:.0f}) px, still after {seconds:.1f} s"

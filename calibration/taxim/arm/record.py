@@ -1,17 +1,24 @@
-"""Ball presses as an arm recorded them, read back from the run's folder alone."""
+"""Ball presses as an arm recorded them, read back from the run's folder alone.
+
+``rest_change`` is the untouched gel as it was while the presses were made. A single picture of it carries its
+own noise, moire and blocks of compression, and is not of the same minute. Every press shows most of the gel
+untouched; where enough of them do, their median has the finer structure better. What varies over more than a
+contact stays the picture's: the presses' own halos do.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-from calibration.taxim.arm.channels import ARM, DESCENT, IMAGE, STATE, UNREST, UNTOUCHED
 from calibration.taxim.arm.moves import ArmScale, arm_scale
 from calibration.taxim.arm.plan import ball_on_gel
 from calibration.taxim.arm.settled import look
 from calibration.taxim.arm.touch_down import middles_at_depth, touch_downs
-from calibration.taxim.pictures import Pictures, Refused, set_digest
-from harness.basics.arrays import ByteArray, FloatArray, block_means, read_only
+from calibration.taxim.pictures import Pictures, PressPack, Refused, set_digest
+from calibration.taxim.smooth_fit import distance
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray, block_means, read_only
 from harness.basics.errors import CalibrationRefused, RecordingDamaged
 from harness.basics.geometry import rotation_from_quaternion, transform
 from harness.bench.reading import Reading
@@ -24,6 +31,39 @@ NAME = "calibrate-taxim"
 
 LEAST_BALL = 1.2
 """Of a measured pitch over the stated one, either way: beyond, the scene's ball or the station is wrong."""
+
+AWAY = 2.5
+"""Radii of the contact from its centre beyond which the gel is taken to be untouched."""
+
+SIGHTINGS = 16
+"""Presses that must show a place untouched. Where the presses lie close together a few remain, with the
+halos of their neighbours: the picture as given is better there."""
+
+_FINE = 1.5
+"""Contact radii, sigma of the blur whose result counts as varying slowly."""
+
+_SEAM = 0.15
+"""Of that sigma, over which the correction fades in, so that it leaves no seam."""
+
+IMAGE = "gel.image"
+"""The press at rest; of a background step the untouched gel."""
+
+UNTOUCHED = "gel.untouched.image"
+"""The gel at the stand-off, just before."""
+
+DESCENT = "gel.descent.image"
+"""On the way down, from the first touch on."""
+
+WAY = "press.way"
+"""m from the stand-off, of each picture of the way down."""
+
+STATE = "press.state"
+"""Whether the ball was met (1 or 0), whether the picture came to rest (1 or 0), s that it took."""
+
+UNREST = "press.unrest"
+"""Grey levels between each look and the one before."""
+
+ARM = "arm.base_from_flange"
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +138,6 @@ class ArmPresses:
         return found
 
 
-def is_arm_run(folder: Path) -> bool:
-    """Whether a folder is a run of ``calibrate taxim``."""
-    return (folder / "run.json").is_file() and Recording(folder).header.experiment == NAME
-
-
 def read_arm_run(folder: Path) -> ArmPresses:
     """Everything that a calibration is made of, from a run's folder.
 
@@ -124,7 +159,8 @@ def read_arm_run(folder: Path) -> ArmPresses:
             f"on with `touchstone calibrate taxim --resume {folder}`"
         )
     station, plan = recording.header.station, recording.header.plan
-    drift, marked = _changed(rests[0], [*rests[1:], *(one.rest for one in taken)])
+    pairs = [changed(rests[0], other) for other in [*rests[1:], *(one.rest for one in taken)]]
+    drift, marked = max(whole for whole, _ in pairs), max(place for _, place in pairs)
     return ArmPresses(
         _pictures(rests[0], taken, folder.name),
         taken,
@@ -222,12 +258,6 @@ def why_not(name: str, touched: bool, settled: bool, unrest: float, seconds: flo
     return None
 
 
-def _changed(first: FloatArray, later: list[FloatArray]) -> tuple[float, float]:
-    """The most that the whole, and that a place beside the whole, moved from the first picture."""
-    pairs = [changed(first, other) for other in later]
-    return max(whole for whole, _ in pairs), max(place for _, place in pairs)
-
-
 def changed(first: FloatArray, later: FloatArray) -> tuple[float, float]:
     """Grey levels by which the untouched gel as a whole, and beside that any place of it, has changed."""
     apart = later - first
@@ -238,3 +268,41 @@ def changed(first: FloatArray, later: FloatArray) -> tuple[float, float]:
 
 def _rounded(picture: FloatArray) -> ByteArray:
     return np.asarray(np.round(picture), dtype=np.uint8)
+
+
+def rest_change(pack: PressPack, change: FloatArray) -> FloatArray:
+    """``(rows, columns, 3)`` grey levels by which the presses' untouched gel differs from the background.
+
+    Args:
+        pack: the presses; their centres and radii say where each is touched.
+        change: ``(presses, rows, columns, 3)`` against the background, drift removed.
+
+    Returns:
+        The median over the presses less what varies slowly of it; 0 where fewer than 16 show the place
+        untouched.
+    """
+    far = np.stack(
+        [distance(pack.shape, c) > AWAY * r for c, r in zip(pack.centres, pack.radii, strict=True)], axis=0
+    )
+    count = far.sum(axis=0)
+    rest = np.zeros(change.shape[1:])
+    seen = count >= SIGHTINGS
+    if not seen.any():
+        return rest
+    # Touched ones sort to the end, and the median is read off the front.
+    values = np.where(far[:, seen, None], change[:, seen], np.inf)
+    values.sort(axis=0)
+    places, n = np.arange(values.shape[1]), count[seen]
+    rest[seen] = 0.5 * (values[(n - 1) // 2, places] + values[n // 2, places])
+    sigma = _FINE * float(np.median(pack.radii))
+    share = np.maximum(gaussian_filter(seen.astype(np.float64), sigma), 1e-6)
+    slow = gaussian_filter(rest, (sigma, sigma, 0.0)) / share[..., None]
+    corrected: FloatArray = _faded(seen, _SEAM * sigma)[..., None] * (rest - slow)
+    return corrected
+
+
+def _faded(seen: BoolArray, width: float) -> FloatArray:
+    """1 well within what is seen, 0 outside, and linear over ``width`` pixels between: no seam."""
+    if seen.all():
+        return np.ones(seen.shape)
+    return np.minimum(distance_transform_edt(seen) / width, 1.0)

@@ -101,7 +101,9 @@ def _contact(change: FloatArray, ball: float) -> FloatArray:
     strength = np.stack([_strength(picture) for picture in change]) if len(change) else np.zeros((0, 1, 1))
     if not len(strength):
         return strength
-    centre = _found(strength[min(2, len(strength) - 1)])
+    smooth = gaussian_filter(strength[min(2, len(strength) - 1)], _FIND)
+    row, column = np.unravel_index(int(np.argmax(smooth)), smooth.shape)
+    centre = np.array([float(column), float(row)])
     y, x = (axis.astype(np.float64) for axis in np.mgrid[: strength.shape[1], : strength.shape[2]])
     for _ in range(_TURNS):
         near = np.hypot(x - centre[0], y - centre[1]) <= _REACH * ball
@@ -115,12 +117,6 @@ def _strength(change: FloatArray) -> FloatArray:
     """Root of the energy of all channels: ``(rows, columns)`` grey levels."""
     energy = (change**2).sum(axis=2)
     return np.sqrt(np.asarray(gaussian_filter(energy, BLUR), dtype=np.float64))
-
-
-def _found(strength: FloatArray) -> FloatArray:
-    smooth = gaussian_filter(strength, _FIND)
-    row, column = np.unravel_index(int(np.argmax(smooth)), smooth.shape)
-    return np.array([float(column), float(row)])
 
 
 def _began(contact: FloatArray, way: Descent) -> FloatArray:

@@ -16,6 +16,11 @@ LONGER = 20.0
 _WORST_SHOWN = 30.0
 """Grey levels at which the map of what is left over ends."""
 
+_SHOWN = 15.0
+"""Grey levels at which the colours end."""
+
+_COLOURS = ("red", "green", "blue")
+
 
 def maps_figure(
     background: ByteArray,
@@ -131,3 +136,77 @@ def _map(figure: Figure, axes: Axes, values: AnyArray, title: str, colours: str,
     shown = axes.imshow(values, cmap=colours, vmin=0.0, vmax=max(highest, 1.0))
     axes.set_title(title, fontsize=10)
     figure.colorbar(shown, ax=axes, shrink=0.8)
+
+
+def bins_figure(errors: FloatArray, reached: BoolArray, steepest: float) -> Figure:
+    """Errors by slope upwards and direction to the right, and beside them which bins were reached.
+
+    Args:
+        errors: ``(slopes, directions)`` grey levels, standard error, root mean square over the channels.
+        reached: ``(slopes, directions)`` whether presses reached a bin.
+        steepest: rad, where the last supported slope ends.
+    """
+    rows, columns = errors.shape
+    shown = max(int(np.ceil(steepest / (0.5 * np.pi) * (rows - 1))), 1)
+    extent = (-180.0, 180.0, 0.0, 90.0 * shown / (rows - 1))
+    error, support = errors[:shown, : columns - 1], reached[:shown, : columns - 1]
+    with styled():
+        figure = blank(12.6, 3.4, "constrained")
+        left, right = np.asarray(figure.subplots(1, 2, sharey=True))
+        drawn = left.imshow(
+            error,
+            cmap="magma",
+            vmin=0.0,
+            vmax=float(np.quantile(error, 0.99)),
+            origin="lower",
+            extent=extent,
+            aspect="auto",
+        )
+        figure.colorbar(drawn, ax=left, shrink=0.9)
+        left.set_title("standard error, grey levels", fontsize=10)
+        right.imshow(support, cmap="Blues", vmin=0.0, vmax=1.6, origin="lower", extent=extent, aspect="auto")
+        right.set_title(f"reached by presses: {support.mean():.0%} of the bins", fontsize=10, color=INK)
+        left.set_ylabel("slope, deg")
+        for axes in (left, right):
+            axes.set_xlabel("direction of the slope, deg")
+    return figure
+
+
+def shadow_figure(
+    directions: FloatArray, step: float, left_over: FloatArray, shaded: BoolArray, dark_sides: FloatArray
+) -> Figure:
+    """Three panels, direction to the right and distance upwards.
+
+    Args:
+        directions: ``(d,)`` rad, in the picture from the columns' direction towards the rows'.
+        step: metres from sample to sample.
+        left_over: ``(3, d, samples)`` grey levels along rays from the rim, red, green, blue.
+        shaded: ``(3, d, samples)`` what is taken for a shadow.
+        dark_sides: ``(3,)`` rad, where slopes turn from each light.
+    """
+    samples = left_over.shape[2]
+    far = 1e3 * step * samples
+    with styled():
+        figure = blank(12.6, 3.4, "constrained")
+        panels = np.asarray(figure.subplots(1, 3, sharey=True))
+        for axes, name, left, cells, dark in zip(
+            panels, _COLOURS, left_over, shaded, dark_sides, strict=True
+        ):
+            shown = axes.imshow(
+                left.T,
+                cmap="RdBu_r",
+                vmin=-_SHOWN,
+                vmax=_SHOWN,
+                origin="lower",
+                extent=(0.0, 360.0, 0.0, far),
+                aspect="auto",
+            )
+            if cells.any():
+                middles = (np.degrees(directions), far * (np.arange(samples) + 0.5) / samples)
+                axes.contour(*middles, cells.T.astype(np.float64), levels=[0.5], colors=INK, linewidths=1.2)
+            axes.axvline(np.degrees(dark), color=INK, lw=1.0, ls="--")
+            axes.set_title(name, fontsize=10)
+            axes.set_xlabel("direction in the picture, deg")
+        panels[0].set_ylabel("from the rim, mm")
+        figure.colorbar(shown, ax=panels, shrink=0.9, label="grey levels left over")
+    return figure

@@ -10,7 +10,7 @@ from harness.sim.optics.tactile_calibration import TactileCalibration
 def filled_share(surface: FloatArray, calibration: TactileCalibration) -> float | None:
     """Share of the sloped pixels whose bin of the table no press reached, though others as steep did.
 
-    Such bins hold what the fit's smooth model says (``calibration.taxim.table_fit``). Pixels steeper than any
+    Such bins hold what the fit's smooth model says (``calibration.taxim.table``). Pixels steeper than any
     press are another matter: they are drawn as the steepest, and ``TactileImages.extrapolated`` counts them.
 
     Args:

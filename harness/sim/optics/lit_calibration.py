@@ -59,7 +59,7 @@ class LitCalibration(TactileCalibration):
         lit: ``(156, 3)``: 120 coefficients of slopes as in ``smooth``, then six of the position for each of
             ``LIGHT_POWERS``, in grey levels a metre of indentation.
         uncertainty: ``(bins, bins, 3)`` grey levels, the standard error of each colour of ``table``
-            (``calibration.taxim.table_error``); ``(0, 0, 3)`` in files that do not say it.
+            (``calibration.taxim.table``); ``(0, 0, 3)`` in files that do not say it.
     """
 
     lit: FloatArray

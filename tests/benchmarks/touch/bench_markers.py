@@ -16,8 +16,8 @@ from rich.console import Console
 from rich.table import Table
 from scipy.spatial import cKDTree
 
+from calibration.markers.at_rest import lay_lattice
 from calibration.markers.dots import find_dots
-from calibration.markers.lattice import lay_lattice
 from harness.basics.arrays import FloatArray
 from harness.bench.sensor import GELSIGHT_R15, MarkerGrid
 from harness.picture.image_file import read_image

@@ -20,7 +20,7 @@ from calibration.taxim.held_out import WITHIN, decibels
 from calibration.taxim.mark_free import Identity, MarkFree, calibrate
 from calibration.taxim.pictures import Pictures, read_pictures
 from calibration.taxim.smooth_fit import contact_pixels
-from calibration.taxim.table_fit import table_shades
+from calibration.taxim.table import table_shades
 from harness.basics.arrays import AnyArray, ByteArray, FloatArray, IntArray
 from harness.basics.errors import CalibrationRefused
 from harness.sim.optics.published_pack import read_table

@@ -16,8 +16,7 @@ import numpy as np
 from rich.console import Console
 
 from calibration.taxim.mark_free import Identity
-from calibration.taxim.pack import PressPack
-from calibration.taxim.pictures import Pictures, read_pictures
+from calibration.taxim.pictures import Pictures, PressPack, read_pictures
 from calibration.taxim.smooth_fit import changes
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.sim.gel.gel import deform

@@ -13,7 +13,7 @@ from rich.table import Table
 from calibration.taxim import light_fit
 from calibration.taxim.held_out import FOLDS, WITHIN, decibels, teach
 from calibration.taxim.light_fit import GelLight, light_shades
-from calibration.taxim.pack import PressPack
+from calibration.taxim.pictures import PressPack
 from calibration.taxim.smooth_fit import changes, distance
 from harness.basics.arrays import FloatArray
 from harness.sim.optics import lit_calibration

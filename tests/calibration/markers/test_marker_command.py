@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from calibration.markers.at_rest import lay_lattice
 from calibration.markers.dots import find_dots
-from calibration.markers.lattice import lay_lattice
 from harness.cli import invoke
 from harness.picture.image_file import read_image, write_png
 from harness.sim.gel.marker_file import read_markers

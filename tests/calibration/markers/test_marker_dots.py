@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from calibration.markers.at_rest import Printed, markers_at_rest
+from calibration.markers.at_rest import Printed, lay_lattice, markers_at_rest
 from calibration.markers.dots import Dots, find_dots, relative_light
-from calibration.markers.lattice import lay_lattice
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, OutOfDomain
 from tests.samples.drawn_dots import COLUMNS, ROWS, DrawnDots, gel

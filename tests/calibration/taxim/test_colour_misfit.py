@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.taxim.colour_misfit import colour_misfit
-from calibration.taxim.held_out import FittedModel, HeldOut, Score, teach
+from calibration.taxim.held_out import FittedModel, HeldOut, Score, colour_misfit, teach
 from calibration.taxim.mark_free import Identity
-from calibration.taxim.pack import PressPack
+from calibration.taxim.pictures import PressPack
 from calibration.taxim.smooth_fit import changes, contact_pixels
 from harness.basics.arrays import FloatArray
 from tests.samples.drawn_presses import BALL, CONTACT, drawn_set

@@ -15,7 +15,7 @@ from calibration.taxim.light_fit import (
     pressed_ball,
     skirt_of,
 )
-from calibration.taxim.pack import PressPack
+from calibration.taxim.pictures import PressPack
 from calibration.taxim.smooth_fit import distance
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused

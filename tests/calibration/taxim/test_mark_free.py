@@ -7,10 +7,8 @@ import pytest
 
 from calibration.taxim import mark_free
 from calibration.taxim.held_out import held_out, teach
-from calibration.taxim.likeness import check_order
-from calibration.taxim.mark_free import Identity, MarkFree, calibrate
-from calibration.taxim.pack import PressPack
-from calibration.taxim.pictures import Pictures
+from calibration.taxim.mark_free import Identity, MarkFree, calibrate, check_order
+from calibration.taxim.pictures import Pictures, PressPack
 from calibration.taxim.smooth_fit import changes
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused

@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.taxim.arm.rest import SIGHTINGS, rest_change
-from calibration.taxim.detect import Detector
+from calibration.taxim.arm.record import SIGHTINGS, rest_change
+from calibration.taxim.gates import Detector
 from calibration.taxim.held_out import score, teach
 from calibration.taxim.mark_free import _usable
-from calibration.taxim.pack import PressPack
-from calibration.taxim.pictures import Pictures, read_pictures
+from calibration.taxim.pictures import Pictures, PressPack, read_pictures
 from calibration.taxim.polycalib import write_polycalib
 from calibration.taxim.smooth_fit import changes
 from harness import cli

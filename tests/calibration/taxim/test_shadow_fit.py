@@ -10,8 +10,7 @@ import pytest
 from calibration.taxim.held_out import teach
 from calibration.taxim.mark_free import Identity, MarkFree, calibrate
 from calibration.taxim.pictures import Pictures
-from calibration.taxim.shadow.fit import fit_shadow
-from calibration.taxim.shadow.polar import DIRECTIONS, rim_reach
+from calibration.taxim.shadow import DIRECTIONS, fit_shadow, rim_reach
 from calibration.taxim.smooth_fit import changes
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import CalibrationRefused, WrongUse

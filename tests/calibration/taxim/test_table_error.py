@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibration.taxim.mark_free import Identity
-from calibration.taxim.pack import PressPack
+from calibration.taxim.pictures import PressPack
 from harness.basics.arrays import BoolArray, FloatArray
 from tests.samples.drawn_presses import BALL, DrawnGel, drawn_set
 from tests.samples.real_press import R15, set_of

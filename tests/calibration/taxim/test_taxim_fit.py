@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.taxim.pack import PressPack, read_pack
+from calibration.taxim.pictures import PressPack, read_pack
 from calibration.taxim.smooth_fit import changes, refined_centre, residual
-from calibration.taxim.table_fit import BINS, bin_of
+from calibration.taxim.table import BINS, bin_of
 from harness.basics.errors import CalibrationRefused, WrongUse
 from harness.sim.optics.tactile_calibration import load_calibration, shipped_calibration
 from tests.oracles.marked_fit import chosen, fit_calibration, fit_smooth, main

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from calibration.taxim.pack import read_pack
+from calibration.taxim.pictures import read_pack
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, DataRefused
 from harness.sim.gel.gel import R15_SKIRT, deform

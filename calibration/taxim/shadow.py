@@ -9,18 +9,25 @@ Balls of one depth show the shadows of one depth. For others the law of the nine
 is taken: samples move out in proportion to the depth of the rim, and darken with its square root. From the
 deepest of those nine it gives the other eight to 3.6 grey levels rms, where the same shadow at every depth is
 16.5 off and no shadow 23.4 (``tests/benchmarks/touch/real_shadows.py law``).
+
+``around`` samples the presses by direction and by distance from the rim. Its polar grid is that of
+``harness.sim.optics.shadow``: rays that start at the outermost pixel of a contact's rim, with a sample every
+so many pixels.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
+from scipy.ndimage import map_coordinates
 
-from calibration.taxim.light_fit import GelLight
-from calibration.taxim.pack import PressPack
-from calibration.taxim.shadow.polar import DIRECTIONS, SAMPLE_STEP, Around, around
+from calibration.taxim.held_out import HeldOut, decibels
+from calibration.taxim.light_fit import REACH, GelLight, light_shades, pressed_ball
+from calibration.taxim.pictures import PressPack
+from calibration.taxim.smooth_fit import distance
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
-from harness.sim.optics.shadow import ShadowTable
+from harness.sim.optics.shadow import RIM, ShadowTable
+from harness.sim.optics.shadow_image import soft_shadows
 
 COLOURS = ("red", "green", "blue")
 
@@ -50,6 +57,24 @@ _NONE = 255.0
 
 ROWS = 8
 """Of depths."""
+
+DIRECTIONS = 64
+SAMPLE_STEP = 1.25
+"""Pixels, as the published tables have it."""
+
+WITHIN = 0.7
+"""Of the contact's radius: where its slopes show which way the light comes."""
+
+OWN = 1.0
+"""Grey levels by which a shadow moves a pixel that is its own."""
+
+LEAST_PIXELS = 20
+"""Of a press, for it to be scored."""
+
+LEAST_GAIN = 0.3
+"""dB in the median over the shadow's own pixels; and two presses in three must gain."""
+
+_SHARE = 2.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -134,13 +159,33 @@ def fit_shadow(pack: PressPack, clean: FloatArray, centres: FloatArray, light: G
     return ShadowFit(table, tuple(colour for colour, _ in found), depth, seen.directions, typical, cells)
 
 
+@dataclass(frozen=True, eq=False)
+class Around:
+    """Presses on one polar grid about their contacts.
+
+    Attributes:
+        directions: ``(d,)`` rad, in the picture: from the columns' direction towards the rows'.
+        starts: ``(d,)`` pixels from the axis where rays begin: the outermost pixel of the rim.
+        seen: ``(presses, d, samples, 3)`` grey levels against the untouched gel; NaN outside the picture.
+        left: the same less what slopes, skirt and light explain.
+        within: ``(d, 3)`` grey levels that are explained within the contact, where no shadow falls.
+    """
+
+    directions: FloatArray
+    starts: FloatArray
+    seen: FloatArray
+    left: FloatArray
+    within: FloatArray
+
+
 def _colour(seen: Around, c: int, enough: BoolArray, known: IntArray) -> tuple[ColourShadow, BoolArray]:
     """What is known of one colour, and which ``(directions, samples)`` its shadow takes."""
     left = seen.left[..., c]
     typical = _typical(left, enough)
     error = _MEDIAN_ERROR * np.nanstd(np.where(enough, left, 0.0), axis=0) / np.sqrt(np.maximum(known, 1))
-    dark_side = _dark_side(seen, c)
-    aside = np.abs(_between(seen.directions, dark_side)) < _ASIDE
+    dark_side = float(np.angle(-(seen.within[:, c] * np.exp(1j * seen.directions)).sum()) % (2.0 * np.pi))
+    turned: FloatArray = (seen.directions - dark_side + np.pi) % (2.0 * np.pi) - np.pi
+    aside = np.abs(turned) < _ASIDE
     dark = (typical < -np.maximum(LEAST, 2.0 * error)) & enough & aside[:, None]
     cells = _largest(dark, typical)
     misfit = float(typical[enough].max(initial=0.0))
@@ -152,6 +197,9 @@ def _colour(seen: Around, c: int, enough: BoolArray, known: IntArray) -> tuple[C
     deepest = -float(typical[darkest])
     sentence = _missing(deepest, float(error[darkest]), misfit)
     falls, falls_error = _direction(seen, left, cells)
+    by_sample = np.where(cells, -typical, 0.0).sum(axis=0)
+    share = np.cumsum(by_sample) / by_sample.sum()
+    reach = float(SAMPLE_STEP * np.interp(0.5, share, np.arange(1, len(share) + 1)))
     return ColourShadow(
         COLOURS[c],
         sentence,
@@ -161,7 +209,7 @@ def _colour(seen: Around, c: int, enough: BoolArray, known: IntArray) -> tuple[C
         deepest,
         float(error[darkest]),
         misfit,
-        _reach(typical, cells),
+        reach,
         float(cells.any(axis=1).sum() * 2.0 * np.pi / DIRECTIONS),
     ), cells if not sentence else np.zeros_like(cells)
 
@@ -190,15 +238,6 @@ def _typical(values: FloatArray, enough: BoolArray) -> FloatArray:
     return typical
 
 
-def _dark_side(seen: Around, c: int) -> float:
-    return float(np.angle(-(seen.within[:, c] * np.exp(1j * seen.directions)).sum()) % (2.0 * np.pi))
-
-
-def _between(directions: FloatArray, other: float) -> FloatArray:
-    turned: FloatArray = (directions - other + np.pi) % (2.0 * np.pi) - np.pi
-    return turned
-
-
 def _largest(dark: BoolArray, typical: FloatArray) -> BoolArray:
     """The connected part that is darkest in all; the last direction touches the first."""
     labels, count = ndimage.label(np.concatenate([dark, dark]))
@@ -222,12 +261,6 @@ def _direction(seen: Around, left: FloatArray, cells: BoolArray) -> tuple[float,
     return float(np.angle(mean) % (2.0 * np.pi)), error
 
 
-def _reach(typical: FloatArray, cells: BoolArray) -> float:
-    by_sample = np.where(cells, -typical, 0.0).sum(axis=0)
-    share = np.cumsum(by_sample) / by_sample.sum()
-    return float(SAMPLE_STEP * np.interp(0.5, share, np.arange(1, len(share) + 1)))
-
-
 def _lists(seen: FloatArray, cells: BoolArray, enough: BoolArray) -> list[FloatArray]:
     """Of every direction the grey levels that its shadow holds colours down to, outwards from the rim."""
     level = np.where(cells, _typical(seen, enough), _NONE)
@@ -249,3 +282,168 @@ def _at_depth(one: FloatArray, share: float) -> FloatArray:
     at = np.rint(np.arange(int(np.ceil(share * len(one)))) / share).astype(np.int64)
     level = one[np.minimum(at, len(one) - 1)]
     return np.where(level < _NONE, np.sqrt(share) * level, _NONE)
+
+
+def around(pack: PressPack, clean: FloatArray, centres: FloatArray, light: GelLight) -> Around:
+    """Look at presses along rays from their rims.
+
+    Args:
+        pack: the presses.
+        clean: ``(presses, rows, columns, 3)`` grey levels against the untouched gel.
+        centres: ``(presses, 2)`` pixels (column, row), of the balls' axes.
+        light: what is explained already.
+    """
+    directions = (np.arange(DIRECTIONS, dtype=np.float64) + 0.5) * (2.0 * np.pi / DIRECTIONS)
+    starts = rim_reach(light.edge, directions)
+    samples = max(2, int((REACH * light.edge - starts.max()) / SAMPLE_STEP))
+    away = starts[:, None] + SAMPLE_STEP * np.arange(samples)
+    offset = np.stack([away * np.cos(directions[:, None]), away * np.sin(directions[:, None])], axis=-1)
+    shape = (len(clean), DIRECTIONS, samples, 3)
+    seen, left = np.empty(shape), np.empty(shape)
+    within: FloatArray = np.zeros((DIRECTIONS, 3))
+    ring = WITHIN * light.edge * np.stack([np.cos(directions), np.sin(directions)], axis=1)
+    for k, centre in enumerate(centres):
+        place = (centre + offset).reshape(-1, 2)[:, ::-1]
+        looked = np.stack(
+            [
+                map_coordinates(clean[k][..., c], place.T, order=1, mode="constant", cval=np.nan)
+                for c in range(3)
+            ],
+            axis=-1,
+        )
+        seen[k] = looked.reshape(shape[1:])
+        left[k] = (looked - light_shades(pack, light, centre, place)).reshape(shape[1:])
+        within += light_shades(pack, light, centre, (centre + ring)[:, ::-1]) / len(centres)
+    return Around(
+        read_only(directions), read_only(starts), read_only(seen), read_only(left), read_only(within)
+    )
+
+
+def rim_reach(edge: float, directions: FloatArray) -> FloatArray:
+    """``(d,)`` pixels from the axis of a round contact to the outermost pixel of its rim.
+
+    The rim is the contact widened by a square, so it reaches further along the diagonals.
+
+    Args:
+        edge: pixels, radius of the contact.
+        directions: ``(d,)`` rad.
+    """
+    side = np.arange(-RIM, RIM + 1)
+    corner = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    along = np.stack([np.cos(directions), np.sin(directions)], axis=1) @ corner.T
+    left = edge**2 - (corner**2).sum(axis=1) + along**2
+    reach: FloatArray = np.where(left >= 0.0, along + np.sqrt(np.maximum(left, 0.0)), 0.0).max(axis=1)
+    return reach
+
+
+@dataclass(frozen=True)
+class ShadowScore:
+    """Presses predicted by the other folds', over the pixels that the shadow moves by a grey level or more.
+
+    Attributes:
+        shaded: dB, median PSNR with the shadow.
+        plain: dB, the same without.
+        gain: dB, median over the presses of the difference.
+        better: share of the presses that are predicted better with it.
+        presses: that were scored.
+        pixels: of a press, median.
+        of: presses there are.
+    """
+
+    shaded: float
+    plain: float
+    gain: float
+    better: float
+    presses: int
+    pixels: float
+
+    of: int
+
+    @property
+    def worth(self) -> bool:
+        """Whether the shadow is to be drawn."""
+        return self.presses >= 0.5 * self.of and self.gain >= LEAST_GAIN and self.better >= _SHARE
+
+    @property
+    def sentence(self) -> str:
+        """What was found, and what was wanted."""
+        return (
+            f"the shadow that all presses show was found by the folds of {self.presses} of {self.of} "
+            f"presses, and predicts {self.better:.0%} of those better, by {self.gain:.2f} dB in the median; "
+            f"half of all, {_SHARE:.0%} and {LEAST_GAIN:g} dB are wanted"
+        )
+
+
+def score_shadow(pack: PressPack, change: FloatArray, out: HeldOut, pitch: float, ball: float) -> ShadowScore:
+    """Score the shadows of every fold on its held-out presses.
+
+    Args:
+        pack: the presses.
+        change: ``(presses, rows, columns, 3)`` grey levels against the background, drift removed.
+        out: how the folds were taught, and the centres of held-out presses.
+        pitch: metres a pixel.
+        ball: radius in pixels.
+    """
+    pairs: list[tuple[float, float, int]] = []
+    for model, taught, left_out in out.folds:
+        clean = change - model.rest
+        fit = fit_shadow(pack.of(taught), clean[taught], model.fit.centres, model.light)
+        for k in left_out:
+            one = _press(pack, clean[k], out.centres[k], model.light, fit, pitch, ball)
+            pairs += [] if one is None else [one]
+    if not pairs:
+        return ShadowScore(np.nan, np.nan, 0.0, 0.0, 0, 0.0, len(change))
+    shaded, plain, pixels = np.array(pairs).T
+    gain = shaded - plain
+    return ShadowScore(
+        float(np.median(shaded)),
+        float(np.median(plain)),
+        float(np.median(gain)),
+        float((gain > 0.0).mean()),
+        len(gain),
+        float(np.median(pixels)),
+        len(change),
+    )
+
+
+def _press(
+    pack: PressPack,
+    clean: FloatArray,
+    centre: FloatArray,
+    light: GelLight,
+    fit: ShadowFit,
+    pitch: float,
+    ball: float,
+) -> tuple[float, float, int] | None:
+    table = fit.in_metres(pitch)
+    if table is None:
+        return None
+    drawn, taken = shaded_press(pack, centre, light, table, pitch, ball)
+    own = taken.max(axis=-1) >= OWN
+    if own.sum() < LEAST_PIXELS:
+        return None
+    left = (drawn - clean)[own]
+    return decibels(left - taken[own]), decibels(left), int(own.sum())
+
+
+def shaded_press(
+    pack: PressPack, centre: FloatArray, light: GelLight, table: ShadowTable, pitch: float, ball: float
+) -> tuple[FloatArray, FloatArray]:
+    """A press without its shadows, and what they take from it: ``(rows, columns, 3)`` grey levels each.
+
+    Args:
+        pack: gives the size of the picture.
+        centre: pixels (column, row).
+        light: slopes, skirt and light.
+        table: with depths in metres.
+        pitch: metres a pixel.
+        ball: radius in pixels.
+    """
+    away = distance(pack.shape, centre)
+    place = np.argwhere(away < REACH * light.edge)
+    change = np.zeros((*pack.shape, 3))
+    change[place[:, 0], place[:, 1]] = light_shades(pack, light, centre, place)
+    surface = np.interp(away, np.arange(len(light.profile.height)), light.profile.height, right=0.0)
+    core: BoolArray = pressed_ball(away, light.depth, ball) > light.skirt.core * light.depth
+    taken, _ = soft_shadows(change[None], pitch * surface[None], surface[None], core[None], table, pitch)
+    return change, taken[0]

@@ -1,1 +1,0 @@
-"""The shadows that a pressed ball throws."""
