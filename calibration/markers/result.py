@@ -9,7 +9,7 @@ from calibration.markers.at_rest import Printed, RestingMarkers
 from calibration.markers.dots import Dots
 from harness.basics.arrays import FloatArray
 from harness.picture.dot_lattice import DotLattice
-from harness.report.figures.dots import found_figure, off_figure
+from harness.report.figures.calibration import found_figure, off_figure
 from harness.report.figures.figures import Album
 from harness.report.template import write_page
 from harness.sim.gel.marker_file import MarkerDot, MarkerFile

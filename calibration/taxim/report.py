@@ -14,8 +14,7 @@ from calibration.taxim.pictures import Pictures
 from calibration.taxim.shadow import SAMPLE_STEP
 from calibration.taxim.smooth_fit import distance
 from harness.basics.arrays import ByteArray, FloatArray
-from harness.report.figures.figures import Album, Picture
-from harness.report.figures.presses import (
+from harness.report.figures.calibration import (
     LONGER,
     bins_figure,
     maps_figure,
@@ -23,6 +22,7 @@ from harness.report.figures.presses import (
     scores_figure,
     shadow_figure,
 )
+from harness.report.figures.figures import Album, Picture
 from harness.report.figures.tiles import DIFFERENCE_GAIN, difference, png
 from harness.report.template import write_page
 from harness.sim.gel.gel import deform

@@ -19,8 +19,14 @@ from harness.experiment.experiment import Scored
 from harness.experiment.lookup import named
 from harness.recording.observation import IMAGE
 from harness.report.figures.figures import Album
-from harness.report.figures.shape import KnownSurface, mask_figure, sections_figure, surface_figure
-from harness.report.figures.shape_strip import SurfaceThen, strip_figure
+from harness.report.figures.shape import (
+    KnownSurface,
+    SurfaceThen,
+    mask_figure,
+    sections_figure,
+    strip_figure,
+    surface_figure,
+)
 from harness.report.run_page import PageSection, write_run_page
 from harness.report.turned import turned_surface
 

@@ -1,11 +1,22 @@
 """The part of a report that holds live readings beside a model of the object and beside the twin."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from harness.agreement.agreement import Agreement, JudgedSense, Residual
-from harness.report.figures.agreement import agreement_figure
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from harness.agreement.agreement import Agreement, SideBySide
+from harness.basics.arrays import FloatArray
 from harness.report.figures.figures import Album, Picture
+from harness.report.figures.style import ANSWER, SOFT, TOOL, blank, styled
 from harness.report.values import Missing
+
+_WIDTH, _HEIGHT, _TITLES = 9.6, 2.2, 0.4
+
+_SCALED = {"m": (1e3, "mm"), "Hz": (1e-3, "kHz"), "covered": (1.0, "covered")}
+"""What each unit is drawn in."""
 
 
 @dataclass(frozen=True)
@@ -58,31 +69,74 @@ def agreement_part(found: Agreement | Missing, album: Album) -> AgreementPart | 
         )
         for one, sentence in zip(found.senses, found.sentences(), strict=True)
     )
-    return AgreementPart(found.about, _summary(found), rows, _picture(found, album))
-
-
-def _summary(found: Agreement) -> str:
     doubt = found.first_doubt
     if doubt is not None:
-        return f"First in doubt: {doubt[1]}, at step {doubt[0] + 1}."
-    return "Everything that can be compared fits." if found.fits else "Nothing could be compared."
+        summary = f"First in doubt: {doubt[1]}, at step {doubt[0] + 1}."
+    else:
+        summary = "Everything that can be compared fits." if found.fits else "Nothing could be compared."
+    return AgreementPart(found.about, summary, rows, _picture(found, album))
 
 
 def _picture(found: Agreement, album: Album) -> Picture | Missing:
-    shown = [(one, residual) for one in found.senses if (residual := _shown(one)) is not None]
-    pairs = {_title(one, residual): residual.sides for one, residual in shown if residual.sides is not None}
+    pairs = {}
+    for one in found.senses:
+        # The residual in doubt, or the first that has a picture.
+        with_picture = [residual for residual in one.compared.residuals if residual.sides is not None]
+        doubted = one.doubted is not None and one.doubted.sides is not None
+        residual = one.doubted if doubted else next(iter(with_picture), None)
+        if residual is not None and residual.sides is not None:
+            of = f"{one.compared.sense} against the {one.compared.source}, step {residual.step + 1}"
+            verdict = "in doubt" if residual is one.doubted else one.verdict
+            pairs[f"{of}: {residual.quantity}, {verdict}"] = residual.sides
     if not pairs:
         return Missing("no sense that was compared has a picture")
     return album.drawing("agreement", agreement_figure(pairs))
 
 
-def _shown(one: JudgedSense) -> Residual | None:
-    """The residual in doubt, or the first that has a picture."""
-    if one.doubted is not None and one.doubted.sides is not None:
-        return one.doubted
-    return next((residual for residual in one.compared.residuals if residual.sides is not None), None)
+def agreement_figure(pairs: Mapping[str, SideBySide]) -> Figure:
+    """Fields as three pictures: live, model, and their difference; values as lines on one axis.
+
+    Args:
+        pairs: one or more, by the title of their row.
+    """
+    with styled():
+        figure = blank(_WIDTH, len(pairs) * (_HEIGHT + _TITLES), "constrained")
+        for part, (title, pair) in zip(
+            np.atleast_1d(np.asarray(figure.subfigures(len(pairs), 1))), pairs.items(), strict=True
+        ):
+            part.suptitle(title, fontsize=10)
+            factor, unit = _SCALED[pair.unit]
+            live, model = factor * pair.live, factor * pair.model
+            if live.ndim == 2:
+                _fields(part.subplots(1, 3), live, model, unit)
+            else:
+                _values(part.subplots(1, 1), live, model, unit)
+    return figure
 
 
-def _title(one: JudgedSense, residual: Residual) -> str:
-    of = f"{one.compared.sense} against the {one.compared.source}, step {residual.step + 1}"
-    return f"{of}: {residual.quantity}, {'in doubt' if residual is one.doubted else one.verdict}"
+def _fields(axes: FloatArray, live: FloatArray, model: FloatArray, unit: str) -> None:
+    low, high = (float(found) for found in (min(live.min(), model.min()), max(live.max(), model.max())))
+    apart = live - model
+    most = max(1e-9, float(np.abs(apart).max()))
+    shown = ((live, "live", low, high), (model, "model", low, high), (apart, "live - model", -most, most))
+    for each, (field, title, least, greatest) in zip(axes, shown, strict=True):
+        colours = "RdBu_r" if field is apart else "viridis"
+        drawn = each.imshow(field, cmap=colours, vmin=least, vmax=greatest, interpolation="nearest")
+        each.set_title(title, fontsize=9)
+        each.set_xticks([])
+        each.set_yticks([])
+        bar = each.figure.colorbar(drawn, ax=each, shrink=0.9, aspect=24)
+        bar.set_label(unit, fontsize=8)
+        bar.ax.tick_params(labelsize=7)
+
+
+def _values(axes: Axes, live: FloatArray, model: FloatArray, unit: str) -> None:
+    """Live values upward, the model's downward, as far as the live ones reach."""
+    near = model[(model >= 0.9 * live.min()) & (model <= 1.1 * live.max())]
+    axes.vlines(live, 0.0, 1.0, color=ANSWER, label="live")
+    axes.vlines(near, -1.0, 0.0, color=TOOL, label="model")
+    axes.axhline(0.0, color=SOFT, linewidth=0.8)
+    axes.set_yticks([])
+    axes.set_xlabel(unit, fontsize=8)
+    axes.tick_params(labelsize=7)
+    axes.legend(fontsize=8, frameon=False, ncols=2)

@@ -54,7 +54,10 @@ def write_catalogue_page(
         PAGE,
         catalogue=catalogue,
         counts=[f"{count} {outcome}" for outcome, count in counts.most_common()],
-        cards=[_card(each) for each in found],
+        cards=[
+            CatalogueCard(each.name, each.outcome, each.reason, _picture(each), tuple(_lines(each)))
+            for each in found
+        ],
         excluded=excluded,
     )
 
@@ -72,10 +75,6 @@ def thumbnail(mesh: Mesh, side: int = _SIDE) -> bytes:
     camera = camera_for(mesh, side, side)
     image = LitObject(plain(mesh, _GREY)).render(camera, [light_for(camera)], samples=2).image
     return png_bytes(image.display())
-
-
-def _card(each: ObjectSummary) -> CatalogueCard:
-    return CatalogueCard(each.name, each.outcome, each.reason, _picture(each), tuple(_lines(each)))
 
 
 def _picture(each: ObjectSummary) -> str:

@@ -10,7 +10,7 @@ from harness.cost.bounds import predicted_at_most
 from harness.cost.curve import Curve, Point, front
 from harness.cost.promise import MET, doubts, promises
 from harness.effects.accuracy import Level
-from harness.report.figures.cost_chart import contacts_chart, cost_chart
+from harness.report.figures.charts import contacts_chart, cost_chart
 from harness.report.figures.figures import Album, Picture
 from harness.report.template import write_page
 
@@ -68,6 +68,20 @@ def write_cost_page(
     """
     folder.mkdir(parents=True, exist_ok=True)
     album = Album(folder)
+    # Settings measured with several numbers of contacts: those of least error with the most.
+    curves = []
+    most = max(float(condition[count]) for condition in curve.conditions())
+    for condition in curve.conditions():
+        if float(condition[count]) != most:
+            continue
+        rest = {name: value for name, value in condition.items() if name != count}
+        several = [p for p in curve.where(condition) if len(_alike(curve, rest, p)) > 1]
+        for point in sorted(several, key=lambda p: p.error.value)[:_DRAWN]:
+            same = sorted(
+                ((int(p.condition[count]), p) for p in _alike(curve, rest, point)), key=lambda pair: pair[0]
+            )
+            said = ", ".join(map(str, rest.values()))
+            curves.append((f"{said}: {point.name}", same))
     return write_page(
         folder / PAGE,
         PAGE,
@@ -78,7 +92,7 @@ def write_cost_page(
             _section(curve.where(condition), condition, number, families, bool(reasons), album)
             for number, condition in enumerate(curve.conditions(), start=1)
         ],
-        by_count=_by_count(curve, count, album),
+        by_count=album.drawing("cost_by_contacts", contacts_chart(curves)) if curves else None,
     )
 
 
@@ -124,24 +138,6 @@ def _promised(point: Point, share: float) -> str:
         return "too few runs"
     at = sure[max(1, int(np.ceil(share * len(sure)))) - 1]
     return f"{1e3 * float(promised[np.searchsorted(limits, at)]):.1f} mm"
-
-
-def _by_count(curve: Curve, count: str, album: Album) -> Picture | None:
-    """Settings measured with several numbers of contacts: those of least error with the most."""
-    curves = []
-    most = max(float(condition[count]) for condition in curve.conditions())
-    for condition in curve.conditions():
-        if float(condition[count]) != most:
-            continue
-        rest = {name: value for name, value in condition.items() if name != count}
-        several = [p for p in curve.where(condition) if len(_alike(curve, rest, p)) > 1]
-        for point in sorted(several, key=lambda p: p.error.value)[:_DRAWN]:
-            same = sorted(
-                ((int(p.condition[count]), p) for p in _alike(curve, rest, point)), key=lambda pair: pair[0]
-            )
-            said = ", ".join(map(str, rest.values()))
-            curves.append((f"{said}: {point.name}", same))
-    return album.drawing("cost_by_contacts", contacts_chart(curves)) if curves else None
 
 
 _DRAWN = 4

@@ -9,7 +9,7 @@ import numpy as np
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.report import wording
 from harness.report.agreement_part import agreement_part
-from harness.report.data import AnswerRow, ContactRow, ErrorCurve, ReportData
+from harness.report.data import AnswerRow, ContactRow, ErrorCurve, PeakLine, ReportData
 from harness.report.figures.charts import error_chart
 from harness.report.figures.figures import Album, Picture
 from harness.report.figures.pictures import (
@@ -22,8 +22,7 @@ from harness.report.figures.pictures import (
     posterior_strip,
 )
 from harness.report.figures.sound import senses_figure, spectrogram_pair
-from harness.report.figures.tiles import DIFFERENCE_GAIN, difference, height_picture, png, root_mean_square
-from harness.report.sound_data import PeakLine, Sound
+from harness.report.figures.tiles import DIFFERENCE_GAIN, difference, height_picture, png
 from harness.report.template import write_page
 from harness.report.values import Missing, Posterior
 
@@ -115,8 +114,19 @@ def _sound(data: ReportData, album: Album, sides: Sides | None) -> dict[str, Any
         return {}
     pair = sound.pair
     truth = data.contacts[-1].truth if data.contacts else None
-    across = _across(data, sound)
-    near = close_up(data.mesh, _towards(data), _to_the_tool(data), across, _SIDE_PIXELS)
+    found = [one.posterior for one in sound.senses if not isinstance(one.posterior, Missing)]
+    around = _towards(data)
+    # The close-up spans the area that every sense's posterior covers, and at most the object.
+    reach = [one.credible90 + float(np.linalg.norm(one.estimate - around)) for one in found]
+    across = min(max(_LEAST_ACROSS, 3.0 * max(reach, default=0.0)), data.mesh.diagonal)
+    # It looks from where the tool came from at the last contact, or outwards where that is unknown.
+    posed = data.contacts[-1].object_from_gel if data.contacts else Missing("there is no contact")
+    to_the_tool = (
+        np.asarray(_towards(data) - data.mesh.bounds.mean(axis=0))
+        if isinstance(posed, Missing)
+        else np.asarray(-posed[:3, 2])
+    )
+    near = close_up(data.mesh, _towards(data), to_the_tool, across, _SIDE_PIXELS)
     believed = {wording.SENSES[sense.name]: sense.posterior for sense in sound.senses}
     return {
         "bars": _bars(sound.peaks),
@@ -129,22 +139,6 @@ def _sound(data: ReportData, album: Album, sides: Sides | None) -> dict[str, Any
             spectrogram_pair(pair.times, pair.frequencies, pair.recorded, pair.simulated),
         ),
     }
-
-
-def _across(data: ReportData, sound: Sound) -> float:
-    """Metres that a close-up shows: what every sense believes, or the object where that is less."""
-    found = [one.posterior for one in sound.senses if not isinstance(one.posterior, Missing)]
-    around = _towards(data)
-    reach = [one.credible90 + float(np.linalg.norm(one.estimate - around)) for one in found]
-    return min(max(_LEAST_ACROSS, 3.0 * max(reach, default=0.0)), data.mesh.diagonal)
-
-
-def _to_the_tool(data: ReportData) -> FloatArray:
-    """``(3,)`` from the last contact to where the tool came from; away from the middle where unknown."""
-    posed = data.contacts[-1].object_from_gel if data.contacts else Missing("there is no contact")
-    if isinstance(posed, Missing):
-        return np.asarray(_towards(data) - data.mesh.bounds.mean(axis=0))
-    return np.asarray(-posed[:3, 2])
 
 
 def _bars(peaks: tuple[PeakLine, ...] | Missing) -> list[float]:
@@ -197,9 +191,8 @@ def _fit(contact: ContactRow) -> str:
     """How far live and simulated readings lie apart, in words."""
     said = []
     if not isinstance(contact.live, Missing) and not isinstance(contact.simulated, Missing):
-        said.append(
-            f"images differ by {root_mean_square(contact.live, contact.simulated):.1f} grey levels rms"
-        )
+        grey_levels = contact.live.astype(np.float64) - contact.simulated.astype(np.float64)
+        said.append(f"images differ by {float(np.sqrt(np.mean(grey_levels**2))):.1f} grey levels rms")
     if not isinstance(contact.live_height, Missing) and not isinstance(contact.simulated_height, Missing):
         apart = float(np.sqrt(np.mean((contact.live_height - contact.simulated_height) ** 2)))
         said.append(f"height maps by {apart * 1e3:.3f} mm rms")

@@ -5,14 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.basics.arrays import AnyArray
-from harness.report.figures.fewer_faces import fewer_faces
-from harness.report.figures.shape import KnownSurface, painted_colours
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.mesh import Mesh
+from harness.report.figures.shape import KnownSurface, scale_of
+from harness.report.figures.style import HEAT
 
 MOST_FACES = 14_000
 """Of a surface on a canvas, which paints them one by one."""
 
 _STEPS = 32_000
+
+_FIRST_CELL = 2.0e-3
+_WIDER = 1.2
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,8 @@ def turned_surface(shown: KnownSurface, most_faces: int = MOST_FACES) -> TurnedS
     middle = mesh.bounds.mean(axis=0)
     step = max(float(np.abs(mesh.vertices - middle).max()), 1e-9) / _STEPS
     marks = np.clip((shown.contacts.reshape(-1, 3) - middle) / step, -_STEPS, _STEPS)
-    colours = 255.0 * painted_colours(shown, deviation)
+    painted = np.asarray(HEAT(scale_of(shown.deviation)(1e3 * deviation)))[:, :3]
+    colours = 255.0 * painted
     return TurnedSurface(
         places=_base64(np.rint((mesh.vertices - middle) / step), "<i2"),
         faces=_base64(mesh.faces, "<u2"),
@@ -54,3 +59,38 @@ def turned_surface(shown: KnownSurface, most_faces: int = MOST_FACES) -> TurnedS
 
 def _base64(values: AnyArray, kind: str) -> str:
     return base64.b64encode(np.ascontiguousarray(values).astype(kind).tobytes()).decode("ascii")
+
+
+def fewer_faces(mesh: Mesh, values: FloatArray, most: int) -> tuple[Mesh, FloatArray]:
+    """A coarser surface to look at, and ``(vertices,)`` values on it: no more than ``most`` faces.
+
+    Vertices of one cell of a grid that face one way become their mean, so that the two sides of a wall stay
+    apart. The result need not be closed.
+
+    Args:
+        mesh: m.
+        values: ``(vertices,)``.
+        most: faces, a hundred or more.
+    """
+    cell = _FIRST_CELL
+    found, carried = mesh, values
+    while len(found.faces) > most:
+        found, carried = _clustered(mesh, values, cell)
+        cell *= _WIDER
+    return found, carried
+
+
+def _clustered(mesh: Mesh, values: FloatArray, cell: float) -> tuple[Mesh, FloatArray]:
+    rows, normals = np.arange(len(mesh.vertices)), mesh.vertex_normals
+    axis = np.abs(normals).argmax(axis=1)
+    side = 2 * axis + (normals[rows, axis] > 0.0)
+    keys = np.column_stack([np.floor(mesh.vertices / cell).astype(np.int64), side])
+    _, cluster = np.unique(keys, axis=0, return_inverse=True)
+    cluster = cluster.ravel()
+    counts = np.bincount(cluster)
+    columns = [np.bincount(cluster, column) / counts for column in (*mesh.vertices.T, values)]
+    faces = cluster[mesh.faces]
+    a, b, c = faces.T
+    return Mesh(np.column_stack(columns[:3]), np.asarray(faces[(a != b) & (b != c) & (c != a)])), np.asarray(
+        columns[3]
+    )

@@ -1,8 +1,7 @@
 """Numbers as an operator reads them, and captions in words."""
 
 from harness.basics.arrays import FloatArray
-from harness.report.data import AnswerRow, ReportData
-from harness.report.sound_data import PeakLine, SenseAnswer, Sound
+from harness.report.data import AnswerRow, PeakLine, ReportData, SenseAnswer, Sound
 from harness.report.values import Missing
 
 SENSES = {"touch": "touch", "audio": "sound", "both": "touch and sound"}
@@ -83,16 +82,14 @@ def heard(sound: Sound) -> str:
         said += f"; together they excite {sound.band[0] / 1e3:.1f} to {sound.band[1] / 1e3:.1f} kHz"
     if not isinstance(sound.peaks, Missing):
         matched = sum(bool(peak.modes) for peak in sound.peaks)
-        said += f". {_count(len(sound.peaks), 'resonance')} in common, {matched} of them taken for modes"
+        number = len(sound.peaks)
+        common = f"{number} {'resonance'}" + ("" if number == 1 else "s")
+        said += f". {common} in common, {matched} of them taken for modes"
         if sound.set_aside:
             said += f", and {sound.set_aside} more set aside as echoes or as more than one waveform"
         side = "above" if sound.scale >= 1.0 else "below"
         said += f". The object rings {100.0 * abs(sound.scale - 1.0):.1f} % {side} its model"
     return said + "."
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" + ("" if number == 1 else "s")
 
 
 def modes_of(peak: PeakLine) -> str:

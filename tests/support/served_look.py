@@ -4,8 +4,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from harness.live_view.frames import LiveFrames
-from harness.live_view.server import LiveServer
+from harness.live_view.server import LiveFrames, LiveServer
 
 
 @contextmanager

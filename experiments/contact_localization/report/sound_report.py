@@ -16,7 +16,7 @@ from harness.basics.errors import FitRefused
 from harness.basics.materials import Material
 from harness.bench.acquisition import Strike
 from harness.experiment.experiment import Scored
-from harness.report.sound_data import PeakLine, SenseAnswer, Sound, SpectrogramPair, StrikeLine
+from harness.report.data import PeakLine, SenseAnswer, Sound, SpectrogramPair, StrikeLine
 from harness.report.values import Missing, Posterior
 from harness.sim.modal.modes import Modes, dampings
 from harness.sim.sound.modal_radiation import radiation

@@ -63,7 +63,7 @@ class Compared:
 def draw(compared: Compared, out: Path) -> None:
     """Write the sheet; it counts among the seconds."""
     from harness.report.figures.figures import Album
-    from harness.report.figures.live import live_figure
+    from harness.report.figures.tiles import live_figure
 
     begun = time.perf_counter()
     Album(out.parent).photograph(out.stem, live_figure(compared.found, _words(compared)))

@@ -134,7 +134,7 @@ def _load_of_others() -> float | None:
 
 
 def _drawn(points: "Sequence[Point]", title: str, out: Path) -> Path:
-    from harness.report.figures.cost_chart import cost_chart
+    from harness.report.figures.charts import cost_chart
     from harness.report.figures.figures import Album
 
     return out / Album(out).drawing("curve", cost_chart(points, ("knob",), title, stale=False)).file

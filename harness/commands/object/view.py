@@ -24,8 +24,7 @@ def view(
 
     Try: touchstone object view objects/mug
     """
-    from harness.live_view.frames import LiveFrames, ViewRequest
-    from harness.live_view.server import LiveServer
+    from harness.live_view.server import LiveFrames, LiveServer, ViewRequest
 
     of, vision = vision_options.opened(folder, threads)
     frames = LiveFrames(of.description.name, vision)

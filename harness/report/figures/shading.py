@@ -1,6 +1,10 @@
-"""Soft, matt shading of what a camera sees: enough to read a shape at a glance."""
+"""Soft, matt shading of what a camera sees: enough to read a shape at a glance.
+
+The camera is a pinhole. What it calls the object's frame is here the world's, in which all bodies are placed.
+"""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, maximum_filter, minimum_filter
@@ -10,7 +14,6 @@ from harness.basics.geometry import apply, inverse, transform
 from harness.basics.mesh import Mesh
 from harness.picture.pinhole import Pinhole
 from harness.report.data import BenchPart
-from harness.report.figures.camera import CameraPicture, back_projected, see
 from harness.sim.gel.height_map import RasterMesh, depth_image
 
 Paint = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
@@ -21,6 +24,8 @@ _SLIVER = 0.01
 _OVERSAMPLING = 2
 _SHADOW_PIXELS = 800
 _KEY, _FILL, _SKY, _BASE, _SHINE = 0.58, 0.22, 0.22, 0.20, 0.07
+
+_BACKWARD = 0.02
 
 
 class Shot:
@@ -65,6 +70,23 @@ class Shot:
             shade = self._light[:, None] * albedo + self._shine[:, None]
             picture[self._filled] = np.clip(shade, 0.0, 1.0) * self._cue[:, None]
         return block_means(picture, _OVERSAMPLING)
+
+
+@dataclass(frozen=True, eq=False)
+class CameraPicture:
+    """What a camera sees, pixel by pixel.
+
+    Attributes:
+        camera: that saw it.
+        depth: ``(rows, columns)`` metres; +inf where nothing is.
+        part: index of the body, -1 where nothing is.
+        face: index of that body's face.
+    """
+
+    camera: Pinhole
+    depth: FloatArray
+    part: IntArray
+    face: IntArray
 
 
 def _normals(
@@ -189,3 +211,64 @@ def _depth_cue(view: CameraPicture) -> FloatArray:
     border = maximum_filter(view.part, 3) != minimum_filter(view.part, 3)
     line = gaussian_filter((jump & border).astype(np.float64) + 0.45 * (jump ^ border), 0.7)
     return np.asarray((1.0 - 0.45 * hollow) * (1.0 - 0.55 * np.clip(line, 0.0, 1.0)))
+
+
+def look_at(
+    focus: FloatArray, azimuth: float, elevation: float, width: float, rows: int, columns: int
+) -> Pinhole:
+    """A camera four picture widths away from what it looks at.
+
+    Args:
+        focus: ``(3,)`` metres, at the centre of the picture.
+        azimuth: rad, bearing of the eye about z from x.
+        elevation: rad above the horizontal, within a right angle.
+        width: metres across the picture at the focus.
+        rows: pixels.
+        columns: pixels.
+    """
+    distance = 4.0 * width
+    away = np.array(
+        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+    )
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    down = np.cross(-away, right)
+    world_from_camera = transform(np.column_stack([right, down, -away]), focus + distance * away)
+    middle = (0.5 * columns, 0.5 * rows)
+    return Pinhole(columns, rows, columns * distance / width, middle, world_from_camera)
+
+
+def back_projected(camera: Pinhole, depth: FloatArray) -> FloatArray:
+    """``(rows, columns, 3)`` points of the world at ``(rows, columns)`` metres of depth."""
+    x = (np.arange(camera.width) + 0.5 - camera.centre_px[0]) / camera.focal_px
+    y = (np.arange(camera.height) + 0.5 - camera.centre_px[1]) / camera.focal_px
+    local = np.stack([x[None, :] * depth, y[:, None] * depth, depth], axis=-1)
+    return apply(camera.object_from_camera, local.reshape(-1, 3)).reshape(local.shape)
+
+
+def see(parts: tuple[BenchPart, ...], camera: Pinhole) -> CameraPicture:
+    """Draw bodies into one depth buffer.
+
+    Orthographic drawing of (x / z, y / z, -1 / z) is perspective drawing: that map keeps
+    lines straight and nearer things nearer.
+    """
+    depth = np.full((camera.height, camera.width), np.inf)
+    owner = np.full(depth.shape, -1, np.int64)
+    face = np.full(depth.shape, -1, np.int64)
+    for index, part in enumerate(parts):
+        local = apply(camera.camera_from_object @ part.base_from_part, part.mesh.vertices)
+        kept = np.flatnonzero((local[part.mesh.faces, 2] > _BACKWARD).all(axis=1))
+        z = np.maximum(local[:, 2], _BACKWARD)
+        warped, kept = (
+            Mesh(np.column_stack([local[:, :2] / z[:, None], -1.0 / z]), part.mesh.faces[kept]),
+            kept,
+        )
+        if len(warped.faces) == 0:
+            continue
+        image = depth_image(RasterMesh(warped), np.eye(4), 1.0 / camera.focal_px, camera.height, camera.width)
+        seen = image.face >= 0
+        distance = np.full(depth.shape, np.inf)
+        distance[seen] = -1.0 / image.depth[seen]
+        nearer = distance < depth
+        depth[nearer], owner[nearer] = distance[nearer], index
+        face[nearer] = kept[image.face[nearer]]
+    return CameraPicture(camera, depth, owner, face)

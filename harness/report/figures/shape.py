@@ -22,6 +22,13 @@ _AMBIENT = 0.45
 _AROUND = 0.35
 _LEAST_SPREAD = 1e-4
 
+_TURN, _HEIGHT = -55.0, 35.0
+_ACROSS = 4
+"""Pictures in a row."""
+
+_WIDTH, _TALL = 2.1, 2.2
+_MARGIN = 0.04
+
 
 @dataclass(frozen=True, eq=False)
 class KnownSurface:
@@ -57,11 +64,6 @@ def surface_figure(shown: KnownSurface) -> Figure:
 def scale_of(deviation: FloatArray) -> Normalize:
     """Of colours for deviations in mm, from nothing to almost the greatest of ``(n,)`` m."""
     return Normalize(0.0, 1e3 * max(float(np.quantile(deviation, 0.98)), _LEAST_SPREAD))
-
-
-def painted_colours(shown: KnownSurface, deviation: FloatArray) -> FloatArray:
-    """``(n, 3)``, 0 to 1: what ``(n,)`` m of deviation look like in the figure of a surface."""
-    return np.asarray(HEAT(scale_of(shown.deviation)(1e3 * deviation)))[:, :3]
 
 
 def seen_from(turn: float, height: float) -> FloatArray:
@@ -153,4 +155,51 @@ def mask_figure(picture: ByteArray, mask: BoolArray) -> Figure:
         axes.set_ylim(min(picture.shape[0], rows.max() + margin), max(0.0, rows.min() - margin))
         axes.set_xticks([])
         axes.set_yticks([])
+    return figure
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceThen:
+    """A surface as it was known at some time of a run.
+
+    Attributes:
+        title: when.
+        words: how well it was known, or why it was not.
+        shown: None where there was none.
+    """
+
+    title: str
+    words: str
+    shown: KnownSurface | None
+
+
+def strip_figure(found: Sequence[SurfaceThen]) -> Figure:
+    """Surfaces one after the other, from one side, at one size and in one scale of colours.
+
+    Args:
+        found: one or more, of which one at least has a surface.
+    """
+    surfaces = [one.shown for one in found if one.shown is not None]
+    scale = scale_of(np.concatenate([one.deviation for one in surfaces]))
+    view = seen_from(_TURN, _HEIGHT)
+    places = [1e2 * one.mesh.vertices @ view[:2].T for one in surfaces]
+    low = np.min([one.min(axis=0) for one in places], axis=0)
+    high = np.max([one.max(axis=0) for one in places], axis=0)
+    low, high = low - _MARGIN * (high - low), high + _MARGIN * (high - low)
+    rows = -(-len(found) // _ACROSS)
+    with styled():
+        figure = blank(_ACROSS * _WIDTH, rows * _TALL, "constrained")
+        axes = np.asarray(figure.subplots(rows, _ACROSS)).ravel().tolist()
+        for one, then in zip(axes, found, strict=False):
+            one.set_title(f"{then.title}\n", fontsize=9, loc="left")
+            one.text(0.0, 1.02, then.words, transform=one.transAxes, fontsize=8, color=SOFT)
+            if then.shown is None:
+                one.set_axis_off()
+            else:
+                paint_surface(one, then.shown, view, scale)
+            one.set_aspect("equal", adjustable="box")
+            one.set_xlim(low[0], high[0])
+            one.set_ylim(low[1], high[1])
+        for one in axes[len(found) :]:
+            one.set_axis_off()
     return figure

@@ -7,10 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from harness.basics.arrays import ByteArray, FloatArray
-from harness.report.figures.style import blank, styled, titled_picture
+from harness.report.figures.style import INK, blank, styled, titled_picture
 from harness.report.figures.tiles import DIFFERENCE_GAIN, difference
+from harness.sim.optics.depth_reading import DepthReading
 
 _WIDTH, _TITLES = 3.6, 0.62
+
+_DEPTH_WIDTH, _DEPTH_TITLES = 3.8, 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +50,11 @@ def touch_figure(shown: TouchPictures) -> Figure:
     with styled():
         figure = blank(3 * _WIDTH + 0.9, down * (_WIDTH * rows / columns + _TITLES), "constrained")
         grid = np.asarray(figure.subplots(down, 3, squeeze=False))
-        _heights(figure, grid[0, 0], shown)
+        axes = grid[0, 0]
+        low, high = min(0.0, float(shown.heights.min())), max(1e-6, float(shown.heights.max()))
+        _map(figure, axes, 1e3 * shown.heights, shown.pitch, (1e3 * low, 1e3 * high), "mm")
+        axes.set_title("indentation", fontsize=10)
+        axes.set_xlabel(f"gel x in mm\n{shown.words[0]}", fontsize=8)
         titled_picture(grid[0, 1], shown.image, "simulated", shown.words[1])
         _difference(grid[0, 2], shown.image, shown.background, "simulated - background", shown.words[2])
         if shown.live is not None:
@@ -109,13 +116,6 @@ def levels_figure(shown: LevelPictures) -> Figure:
     return figure
 
 
-def _heights(figure: Figure, axes: Axes, shown: TouchPictures) -> None:
-    low, high = min(0.0, float(shown.heights.min())), max(1e-6, float(shown.heights.max()))
-    _map(figure, axes, 1e3 * shown.heights, shown.pitch, (1e3 * low, 1e3 * high), "mm")
-    axes.set_title("indentation", fontsize=10)
-    axes.set_xlabel(f"gel x in mm\n{shown.words[0]}", fontsize=8)
-
-
 def _map(
     figure: Figure,
     axes: Axes,
@@ -156,3 +156,37 @@ def _check(shown: TouchPictures) -> None:
         )
     if len(shown.words) < (3 if shown.live is None else 6):
         raise ValueError(f"{len(shown.words)} captions; each picture has one")
+
+
+def depth_figure(shown: DepthReading) -> Figure:
+    """Live picture, indentation in mm, and one standard deviation of it in micrometres.
+
+    The contact is outlined; dots are where the slope was held or doubtful.
+    """
+    rows, columns = shown.height.shape
+    half = 0.5e3 * shown.pitch * np.array([columns, rows])
+    extent = (-half[0], half[0], half[1], -half[1])
+    with styled():
+        figure = blank(3 * _DEPTH_WIDTH + 1.2, _DEPTH_WIDTH * rows / columns + _DEPTH_TITLES, "constrained")
+        live, height, sigma = np.asarray(figure.subplots(1, 3))
+        live.imshow(shown.image, extent=extent)
+        live.set_title("live", fontsize=10)
+        drawn = height.imshow(1e3 * shown.height, cmap="viridis", extent=extent, interpolation="nearest")
+        figure.colorbar(drawn, ax=height, shrink=0.85, label="mm")
+        height.set_title("indentation", fontsize=10)
+        drawn = sigma.imshow(1e6 * shown.sigma, cmap="magma", extent=extent, interpolation="nearest")
+        figure.colorbar(drawn, ax=sigma, shrink=0.85, label="um")
+        sigma.set_title("one standard deviation; dots: slope not trusted", fontsize=10)
+        x, y = (shown.pitch * 1e3 * (np.arange(size) + 0.5 - 0.5 * size) for size in (columns, rows))
+        if shown.contact.any() and not shown.contact.all():
+            height.contour(
+                x, y, shown.contact.astype(np.float64), levels=[0.5], colors="white", linewidths=1.0
+            )
+        doubtful = ~shown.trusted & shown.contact
+        if doubtful.any():
+            row, column = np.nonzero(doubtful)
+            sigma.plot(x[column], y[row], ls="none", marker=".", ms=1.5, color="white")
+        for axes in (live, height, sigma):
+            axes.set_xlabel("gel x, mm", fontsize=8, color=INK)
+        live.set_ylabel("gel y, mm", fontsize=8, color=INK)
+    return figure

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.commands.output import ANSWERS
-from harness.live_view.frames import LiveFrames
+from harness.live_view.server import LiveFrames
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.vision.render import open_vision
 from tests.support.served_look import served

@@ -22,7 +22,7 @@ from harness.experiment.in_process import performed
 from harness.experiment.levels import chosen_levels
 from harness.experiment.object_modes import object_modes
 from harness.recording.run_folder import RunFiles
-from harness.report.simulated import network_rows
+from harness.report.run_page import network_rows
 from harness.sim.gel import height_map, raster_kernels
 
 STATION = load_station(station_path("mock"))

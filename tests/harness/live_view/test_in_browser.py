@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.basics.arrays import FloatArray
-from harness.live_view.frames import LiveFrames
+from harness.live_view.server import LiveFrames
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.vision.render import open_vision
 from tests.samples.look_bench import box_file, told_look

@@ -13,8 +13,7 @@ import pytest
 
 from harness.basics.errors import WrongUse
 from harness.cli import invoke
-from harness.live_view.frames import NAMES, LiveFrames
-from harness.live_view.server import SAID, LiveServer, page
+from harness.live_view.server import NAMES, SAID, LiveFrames, LiveServer, page
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.vision.render import open_vision
 from tests.samples.look_bench import box_file, told_look

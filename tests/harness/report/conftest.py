@@ -19,11 +19,15 @@ from harness.report.data import (
     EffectRun,
     ErrorCurve,
     InstrumentRow,
+    PeakLine,
     ReportData,
+    SenseAnswer,
+    Sound,
+    SpectrogramPair,
+    StrikeLine,
     TwinDeviation,
 )
-from harness.report.figures.props import arm_parts, object_part, sensor_parts, table_and_pedestal
-from harness.report.sound_data import PeakLine, SenseAnswer, Sound, SpectrogramPair, StrikeLine
+from harness.report.figures.pictures import arm_parts, object_part, sensor_parts, table_and_pedestal
 from harness.report.values import Missing, Posterior
 from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
 

@@ -12,7 +12,7 @@ from harness.bench.device import Health
 from harness.bench.reading import Channel, Reading
 from harness.bench.station_file import load_station, station_path
 from harness.recording.run_folder import RunFiles
-from harness.report.instruments import artefacts, instruments, samples
+from harness.report.run_page import artefacts, instruments, samples
 from harness.report.values import Missing
 from harness.sim.optics.tactile_calibration import shipped_calibration
 

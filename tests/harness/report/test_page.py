@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from harness.effects.explain_networks import NetworkInUse
-from harness.report.data import AnswerRow, ReportData
+from harness.report.data import AnswerRow, ReportData, StrikeLine
 from harness.report.page import write_report
-from harness.report.sound_data import StrikeLine
 from harness.report.values import Missing
 
 SECTIONS = (
@@ -239,7 +238,7 @@ def test_the_same_data_give_the_same_bytes(report_data: ReportData, tmp_path: Pa
 
 
 def test_a_report_needs_no_simulator_of_the_arm() -> None:
-    ask = "import sys, harness.report.page, harness.report.figures.props; print('mujoco' in sys.modules)"
+    ask = "import sys, harness.report.page, harness.report.figures.pictures; print('mujoco' in sys.modules)"
     answer = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "False"
 

@@ -16,9 +16,8 @@ from matplotlib.path import Path as Polygon
 from harness.basics.faces.nearest_surface import NearestSurface
 from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
-from harness.report.figures.fewer_faces import fewer_faces
 from harness.report.figures.shape import KnownSurface, seen_from
-from harness.report.turned import turned_surface
+from harness.report.turned import fewer_faces, turned_surface
 
 MUG = build("mug", 4e-3)
 CONTACTS = np.array([[0.04, 0.0, 0.05], [-0.04, 0.0, 0.03]])

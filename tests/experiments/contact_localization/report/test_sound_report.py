@@ -26,7 +26,7 @@ from harness.effects.accuracy import Accuracy
 from harness.experiment.experiment import Scored
 from harness.experiment.truth import Truth
 from harness.recording.observation import Observation
-from harness.report.sound_data import Sound
+from harness.report.data import Sound
 from harness.report.values import Missing
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples import sounding_plate as plate

@@ -1,7 +1,7 @@
 """The drawing of error and seconds against the number of contacts."""
 
 from harness.cost.curve import Point, Sample
-from harness.report.figures.cost_chart import contacts_chart
+from harness.report.figures.charts import contacts_chart
 
 
 def point(contacts: int, error: float) -> Point:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.picture.live_picture import compare_live
-from harness.report.figures.live import live_figure
+from harness.report.figures.tiles import live_figure
 from tests.samples.exposed_pictures import bench_alone, pictured, taken
 
 IMAGE = pictured(radius=12.0)

@@ -6,8 +6,7 @@ from matplotlib.text import Text
 
 from harness.basics.arrays import FloatArray
 from harness.report.data import ErrorCurve
-from harness.report.figures.charts import error_chart
-from harness.report.figures.marks import number_marks
+from harness.report.figures.charts import error_chart, number_marks
 from harness.report.figures.style import blank
 
 

@@ -11,15 +11,15 @@ from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
 from harness.objects.household import build
 from harness.report.figures.figures import Album
-from harness.report.figures.mode_pictures import (
-    FLOOR,
+from harness.report.figures.pictures import box
+from harness.report.figures.sound import (
+    MODE_FLOOR,
     SHOWN,
     ShownStrike,
     colourable,
     spectrogram,
     strike_figure,
 )
-from harness.report.figures.props import box
 
 RATE = 44_100.0
 FREQUENCIES = np.array([800.0, 2400.0, 5200.0])
@@ -60,7 +60,7 @@ def tiles(figure: Figure) -> list[FloatArray]:
 def test_a_spectrogram_has_its_modes_where_they_are_and_decays_as_they_do() -> None:
     times, frequencies, levels = spectrogram(ringing(), RATE)
     assert levels.max() == 0.0
-    assert levels.min() == FLOOR
+    assert levels.min() == MODE_FLOOR
     for frequency, rate in zip(FREQUENCIES, DAMPINGS, strict=True):
         row = levels[np.argmin(np.abs(frequencies - frequency))]
         inside = (times > 0.05) & (times < 0.15)

@@ -9,11 +9,9 @@ from hypothesis import strategies as st
 from harness.basics.geometry import translation
 from harness.basics.mesh_hull import closed_hull
 from harness.report.data import BenchPart, ErrorCurve
-from harness.report.figures.camera import back_projected, look_at, see
 from harness.report.figures.charts import error_chart
-from harness.report.figures.pictures import Heat
-from harness.report.figures.props import box, cylinder
-from harness.report.figures.shading import Shot
+from harness.report.figures.pictures import Heat, box, cylinder
+from harness.report.figures.shading import Shot, back_projected, look_at, see
 from harness.report.figures.tiles import difference, height_picture, png
 from harness.report.values import Posterior
 from harness.report.wording import duration, millimetres

@@ -6,8 +6,7 @@ from matplotlib.collections import PolyCollection
 
 from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
-from harness.report.figures.shape import KnownSurface
-from harness.report.figures.shape_strip import SurfaceThen, strip_figure
+from harness.report.figures.shape import KnownSurface, SurfaceThen, strip_figure
 
 MUG = build("mug", 8e-3)
 
