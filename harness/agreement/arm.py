@@ -8,14 +8,12 @@ from scipy.linalg import solve_triangular
 
 from harness.agreement.agreement import Residual, SenseResiduals
 from harness.agreement.place_noise import PlaceNoise, shared_twists
-from harness.agreement.readings import PressedContact, refusal_notes
-from harness.agreement.subject import Subject
+from harness.agreement.subject import PressedContact, Subject, refusal_notes
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_from_quaternion, rotation_from_vector, transform
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
-from harness.twin.bench import TwinBench
-from harness.twin.bench_of import twin_of
+from harness.twin.bench import TwinBench, twin_of
 from harness.twin.compare import compare_arm
 
 TABLES = 1.0e-3

@@ -8,9 +8,8 @@ from typing import ParamSpec
 from harness.agreement.agreement import Agreement, Sense, SenseResiduals, Source, judged
 from harness.agreement.arm import compare_with_twin
 from harness.agreement.camera import compare_camera
-from harness.agreement.readings import PressedContact, contacts_of
 from harness.agreement.sound import compare_sound
-from harness.agreement.subject import Subject, own_subject
+from harness.agreement.subject import PressedContact, Subject, contacts_of, own_subject
 from harness.agreement.touch import compare_touch
 from harness.basics.errors import WrongUse
 from harness.objectfile.entries import Modality

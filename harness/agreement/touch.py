@@ -1,30 +1,88 @@
 """Touch: the gel's surface, as its picture shows it and as a model of the object gives it.
 
 The gel's pose is known to a few tenths of a millimetre and a degree, which moves most of a picture: it is
-found anew at each contact (``harness.agreement.likeliest``), and what it is off by counts beside what the
+found anew at each contact (``likeliest``), and what it is off by counts beside what the
 surface is off by.
 A network is wrong altogether at some places, so that no single contact speaks against an object; how many do
 not fit is binomial where the object is right.
+
+``likeliest`` finds the pose of the gel at which a contact's picture and a model of the object agree best.
+Eight numbers of a contact are known to a stated sigma only: six of the gel's pose, the gain by which its
+picture shows heights, and how far it hangs from what it touches. They are found between the reading and their
+prior (Gauss-Newton, slopes by differences). For errors that are normal, what is left at the best of them,
+with what they are off by, is a chi-square of as many degrees as there are independent readings.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 from scipy.stats import binom, chi2
 
 from harness.agreement.agreement import Residual, SenseResiduals, SideBySide, Source
-from harness.agreement.likeliest import SurfaceNoise, Surfaces, likeliest
-from harness.agreement.place_noise import PlaceNoise
-from harness.agreement.readings import PressedContact, refusal_notes
-from harness.agreement.stated_error import gross_share
-from harness.agreement.subject import Subject
-from harness.basics.arrays import FloatArray
+from harness.agreement.arm import twisted
+from harness.agreement.place_noise import PlaceNoise, twist_covariance
+from harness.agreement.stated_error import gross_share, map_errors
+from harness.agreement.subject import SEEN, PressedContact, Subject, refusal_notes
+from harness.basics.arrays import BoolArray, FloatArray, block_means
 from harness.basics.errors import OutOfDomain, WrongUse
+from harness.basics.geometry import inverse
 
 _IMPROBABLE = 0.01
 """Probability below which a contact counts as one that does not fit."""
 
 _LEAST = 1.0e-300
+
+_STEPS = np.repeat([0.15e-3, np.radians(0.4)], 3)
+_STEP = 0.1
+"""Of a sigma of gain and skirt, over which slopes are taken."""
+
+_DEEPER = (-0.8e-3, -0.4e-3, 0.0, 0.4e-3, 0.8e-3, 1.2e-3, 1.6e-3, 2.4e-3)
+_ASIDE = ((0.0, 0.0), (1.2e-3, 0.0), (-1.2e-3, 0.0), (0.0, 1.2e-3), (0.0, -1.2e-3))
+"""m along the gel's axes from the stated pose to those at which a search may start: where the model does not
+reach the gel, or an edge lies on the other side of it, no slope leads to the contact."""
+
+_POORLY = 1.5
+"""Times the degrees of freedom, from which on a chi-square may be that of a wrong minimum."""
+
+_ROUNDS = 8
+_SETTLED = 0.05
+"""Of a chi-square: a round that gains less is the last."""
+
+_SHORTEN = (1.0, 0.5, 0.25, 0.1)
+"""Of a step, tried at once: where the object bends, a whole one may go too far."""
+
+
+@dataclass(frozen=True)
+class SurfaceNoise:
+    """How far a gel's surface by its picture may be from a model's.
+
+    Attributes:
+        rms: m, one sigma at the true pose, of the touched surface: the light's shading (0.03 mm), and as
+            much again of the object's small bends.
+        aside: m, one sigma of where an edge lies within a contact: times the slope there it adds to ``rms``.
+        gain: one sigma of how much higher or lower the picture shows the gel than it is, of its height.
+        skirt: m, one sigma of the blur by which the gel hangs farther from what it touches than modelled.
+        length: m over which errors of a surface are alike: so many of them stand side by side in a contact.
+        block: m, a side of the blocks of pixels that are averaged.
+        core: share of the deepest place above which a surface is compared: below it, it is the gel that
+            hangs from the contact, not the object that shapes it.
+        rim: m along the picture's border that are not compared: heights are integrated from slopes, and
+            beyond the border there are none.
+        most: sigmas that one block counts as at most, once the pose is found: a crease that the gel does not
+            reach is a few blocks far off, another object is all of them off.
+    """
+
+    rms: float = 0.042e-3
+    aside: float = 0.1e-3
+    gain: float = 0.07
+    skirt: float = 0.7e-3
+    length: float = 3.0e-3
+    block: float = 0.6e-3
+    core: float = 0.4
+    rim: float = 1.2e-3
+    most: float = 3.0
 
 
 def compare_touch(
@@ -64,6 +122,32 @@ def compare_touch(
     why = "; ".join(notes) or ("" if contacts else "no picture of the gel was recorded")
     refused = contacts[0].step if contacts and all(contact.refusal for contact in contacts) else None
     return SenseResiduals("touch", source, tuple(residuals), why, refused_at=refused)
+
+
+@dataclass(frozen=True, eq=False)
+class Surfaces:
+    """A reading beside a model, at the likeliest pose.
+
+    Attributes:
+        read: ``(rows, columns)`` m of indentation, in blocks.
+        modelled: the same.
+        variances: ``(s, rows, columns)`` m^2 of their difference, for each of ``s`` errors of the source that
+            are as probable as each other.
+        compared: ``(rows, columns)`` where they were compared.
+        pitch: m, a side of a block.
+        twist: ``(6,)`` m and rad from the stated pose, in base.
+        gain: of the heights read over the model's.
+        prior: chi-square of twist, gain and skirt.
+    """
+
+    read: FloatArray
+    modelled: FloatArray
+    variances: FloatArray
+    compared: BoolArray
+    pitch: float
+    twist: FloatArray
+    gain: float
+    prior: float
 
 
 def surface_residual(step: int, found: Surfaces, noise: SurfaceNoise, gross: float = 0.0) -> Residual:
@@ -128,3 +212,191 @@ def counted_residual(residuals: Sequence[Residual], gross: float) -> Residual:
     }
     chi_square = -2.0 * float(np.log(max(probability, _LEAST)))
     return Residual(residuals[-1].step, "contacts together", chi_square, 2.0, numbers)
+
+
+def likeliest(
+    subject: Subject, source: Source, contact: PressedContact, places: PlaceNoise, noise: SurfaceNoise
+) -> Surfaces:
+    """The pose between reading and prior at which a contact fits best, and both surfaces there.
+
+    Args:
+        subject: the object, where the scene states it.
+        source: the ObjectFile's network, or the reference.
+        contact: of the run.
+        places: of the gel's pose.
+        noise: of the surface.
+
+    Raises:
+        OutOfDomain: no network was made for the stated pose, or for those at which it would fit.
+        WrongUse: the network is of another gel or object.
+    """
+    return _Search(subject, source, contact, places, noise).best()
+
+
+class _Search:
+    """One contact's likeliest pose, gain and skirt, each over its sigma: ``(8,)``."""
+
+    def __init__(
+        self,
+        subject: Subject,
+        source: Source,
+        contact: PressedContact,
+        places: PlaceNoise,
+        noise: SurfaceNoise,
+    ) -> None:
+        self._subject, self._source, self._noise = subject, source, noise
+        self._pose = contact.seen.base_from_gel
+        sensor = subject.run.station.gel.sensor
+        self._block = max(1, round(noise.block / sensor.pitch))
+        self._pitch = self._block * sensor.pitch
+        self._read = self._coarse(contact.heights)
+        rim = round(noise.rim / self._pitch)
+        self._inside = np.zeros(self._read.shape, np.bool_)
+        self._inside[rim : -rim or None, rim : -rim or None] = True
+        self._errors = map_errors(subject, source)
+        self._error = float(np.sqrt(np.mean(self._errors**2)))
+        anchor = subject.base_from_object[:3, 3]
+        self._root = np.linalg.cholesky(twist_covariance(places, self._pose, anchor))
+
+    def best(self) -> Surfaces:
+        at, modelled = self._best()
+        compared, twist = self._compared(modelled), self._root @ at[:6]
+        gain = 1.0 + self._noise.gain * float(at[6])
+        variances = np.array([self._variance(modelled, compared, error) for error in self._errors])
+        return Surfaces(self._read, modelled, variances, compared, self._pitch, twist, gain, float(at @ at))
+
+    def _best(self) -> tuple[FloatArray, FloatArray]:
+        """The unknowns and the surface of the best search; a second one only where the first fits badly."""
+        found: list[tuple[float, FloatArray, FloatArray]] = []
+        for places in (_ASIDE[:1], _ASIDE[1:]):
+            at, free = self._settled(self._start(places))
+            (modelled,) = self._simulated([at])
+            if modelled is None:
+                continue
+            modelled = self._shown(modelled, at)
+            cost = self._whole_cost(modelled, at)
+            if cost < _POORLY * self._dof(self._compared(modelled)):
+                return at, modelled
+            if free:
+                found.append((cost, at, modelled))
+        if not found:
+            raise OutOfDomain(
+                f"the touch's {self._source} was made neither for the stated pose of the gel nor for those "
+                "about it at which it would fit; compare with --reference"
+            )
+        return min(found, key=lambda one: one[0])[1:]
+
+    def _start(self, places: Sequence[tuple[float, float]]) -> FloatArray:
+        """The likeliest of poses about the stated one; the stated one where the source knows none of them."""
+        moves = np.array([(*across, deeper) for across in places for deeper in _DEEPER])
+        twists = np.column_stack([moves @ self._pose[:3, :3].T, np.zeros_like(moves)])
+        tried = np.column_stack([np.linalg.solve(self._root, twists.T).T, np.zeros((len(moves), 2))])
+        costs = self._costs(tried, self._whole_cost)
+        best = int(np.argmin(costs))
+        return tried[best] if np.isfinite(costs[best]) else np.zeros(8)
+
+    def _settled(self, at: FloatArray) -> tuple[FloatArray, bool]:
+        """The end of a search, and whether it was free to end elsewhere."""
+        free = True
+        for _ in range(_ROUNDS):
+            at, gained, free = self._round(at)
+            if gained < _SETTLED:
+                break
+        return at, free
+
+    def _whole_cost(self, modelled: FloatArray, at: FloatArray) -> float:
+        """The chi-square where either of both touches; infinite where neither does."""
+        mask = self._compared(modelled)
+        return self._cost(modelled, at, mask, self._weights(modelled, mask)) if mask.any() else np.inf
+
+    def _round(self, at: FloatArray) -> tuple[FloatArray, float, bool]:
+        """The next unknowns, the chi-square gained, and whether the source knows a whole step from here."""
+        steps = np.column_stack([np.diag(_STEPS / np.linalg.norm(self._root, axis=1)), np.zeros((6, 2))])
+        surface, *ahead = self._simulated([at, *(at + steps)])
+        if surface is None:
+            return at, 0.0, False
+        here = self._shown(surface, at)
+        mask = self._compared(here)
+        if not mask.any():
+            return at, 0.0, True
+        moved = self._slopes_of_pose(here, at, steps, ahead)
+        shown = [(self._shown(surface, at + step) - here) / _STEP for step in _STEP * np.eye(8)[6:]]
+        slopes = np.array([slope[mask] for slope in (*moved, *shown)]).T
+        weights, gaps = self._weights(here, mask), (self._read - here)[mask]
+        weighted = weights[:, None] * slopes
+        full = np.linalg.solve(weighted.T @ slopes + np.eye(8), weighted.T @ gaps - at)
+        tried = np.array([at + share * full for share in _SHORTEN])
+        costs = self._costs(tried, lambda one, then: self._cost(one, then, mask, weights))
+        best, free = int(np.argmin(costs)), bool(np.isfinite(costs[0]))
+        gained = self._cost(here, at, mask, weights) - costs[best]
+        return (tried[best], gained, free) if gained > 0.0 else (at, 0.0, free)
+
+    def _slopes_of_pose(
+        self, here: FloatArray, at: FloatArray, steps: FloatArray, ahead: Sequence[FloatArray | None]
+    ) -> list[FloatArray]:
+        """Change of the surface with each unknown of the pose, by a step to a side that the source knows."""
+        slopes = []
+        for step, one in zip(steps, ahead, strict=True):
+            way, moved = (step, one) if one is not None else (-step, self._simulated([at - step])[0])
+            known = None if moved is None else self._shown(moved, at) - here
+            # Where neither side is known the unknown stays what it is.
+            slopes.append(np.zeros_like(here) if known is None else known / way.sum())
+        return slopes
+
+    def _costs(self, tried: FloatArray, cost: Callable[[FloatArray, FloatArray], float]) -> FloatArray:
+        """``(n,)`` of unknowns ``(n, 8)``; infinite where the source was not made for the pose."""
+        surfaces = zip(self._simulated(tried), tried, strict=True)
+        return np.array([np.inf if one is None else cost(self._shown(one, at), at) for one, at in surfaces])
+
+    def _cost(self, modelled: FloatArray, at: FloatArray, mask: BoolArray, weights: FloatArray) -> float:
+        return float(weights @ (self._read - modelled)[mask] ** 2 + at @ at)
+
+    def _weights(self, modelled: FloatArray, mask: BoolArray) -> FloatArray:
+        """1/m^2 of each block: blocks beside each other are off alike."""
+        return self._dof(mask) / int(mask.sum()) / self._variance(modelled, mask, self._error)[mask]
+
+    def _variance(self, modelled: FloatArray, mask: BoolArray, error: float) -> FloatArray:
+        """m^2 of each block, where ``mask`` is compared and the source's map is off by ``error`` in m."""
+        down, across = np.gradient(modelled, self._pitch)
+        edges = self._noise.aside**2 * (down**2 + across**2)
+        # What a map is off by lies where the object shapes the gel: elsewhere both are flat.
+        own = error**2 * mask.size / max(1, int(mask.sum()))
+        return np.asarray(self._noise.rms**2 + edges + own)
+
+    def _dof(self, mask: BoolArray) -> float:
+        """So many patches of a contact are off independently of each other."""
+        return max(1.0, int(mask.sum()) * (self._pitch / self._noise.length) ** 2)
+
+    def _simulated(self, tried: Sequence[FloatArray] | FloatArray) -> list[FloatArray | None]:
+        """The gel's surfaces in blocks, by pose alone; None of a pose that the source was not made for."""
+        try:
+            return [self._coarse(surface) for surface in self._surfaces(tried)]
+        except OutOfDomain:
+            if len(tried) == 1:
+                return [None]
+        half = len(tried) // 2
+        return [*self._simulated(tried[:half]), *self._simulated(tried[half:])]
+
+    def _surfaces(self, tried: Sequence[FloatArray] | FloatArray) -> FloatArray:
+        """``(n, rows, columns)`` m of the gel's surface."""
+        poses = np.array([twisted(self._pose, self._root @ at[:6]) for at in tried])
+        given = {"contact.gel_from_object": inverse(poses) @ self._subject.base_from_object}
+        found: FloatArray = self._subject.simulated("touch", self._source, ("touch.gel",), given)["touch.gel"]
+        return found
+
+    def _shown(self, surface: FloatArray, at: FloatArray) -> FloatArray:
+        """A surface as its picture would show it, with its gain and its skirt."""
+        hung = gaussian_filter(surface, self._noise.skirt / self._pitch, mode="nearest")
+        return np.asarray((1.0 + self._noise.gain * at[6]) * (surface + at[7] * (hung - surface)))
+
+    def _coarse(self, heights: FloatArray) -> FloatArray:
+        rows, columns = (size // self._block * self._block for size in heights.shape)
+        top, left = (heights.shape[0] - rows) // 2, (heights.shape[1] - columns) // 2
+        return block_means(heights[top : top + rows, left : left + columns], self._block)
+
+    def _compared(self, modelled: FloatArray) -> BoolArray:
+        """Where the object shapes the gel, by the picture or by the model."""
+        return self._core(self._read) | self._core(modelled)
+
+    def _core(self, heights: FloatArray) -> BoolArray:
+        return np.asarray(self._inside & (heights > max(SEEN, self._noise.core * float(heights.max()))))

@@ -1,6 +1,12 @@
 """Contacts: travel, touch, press, read, retreat; strike where sound is asked for.
 
 Everything a step needs is in its parameters, planned and rehearsed before the first one moves.
+
+``first_touch`` finds where on its way the gel first touched, from the arm's own packets. Where the arm stops
+tells little: the stop comes some packets late, the threshold is met by the noise of one packet, and zeroing
+takes one packet's noise as its zero. On a soft contact these move the stop by tenths of a millimetre from one
+press to the next. The mean force of the free way gives the zero, and a short mean over packets the moment at
+which the force left it.
 """
 
 import math
@@ -20,9 +26,16 @@ from harness.bench.station import PRESS, Bench
 from harness.bench.travel import Trajectory, travel
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step
-from harness.skills.first_touch import first_touch
-from harness.skills.search import SearchGuard, meets
-from harness.skills.strike import FARTHEST, Ask, StrikeMotion, ready_of, strike, strike_by_hand
+from harness.skills.strike import (
+    FARTHEST,
+    Ask,
+    SearchGuard,
+    StrikeMotion,
+    meets,
+    ready_of,
+    strike,
+    strike_by_hand,
+)
 from harness.twin.motion import PlannedContact
 
 FRAMES_PER_CONTACT = 3
@@ -33,6 +46,17 @@ SETTLE = 0.3
 
 After = Callable[[Step, Sequence[Reading]], StrikeMotion | None]
 """Plans a strike on what a contact has just read; None where none is to be made, or none is free."""
+
+_ARRAYS = ("start_rad", "travel_rad", "base_from_stand_off", "axis_in_base")
+
+AVERAGED = 0.02
+"""s over which the force is averaged: the noise of ten packets at 500 Hz, and 0.2 mm of the way."""
+
+FREE = 3.0e-3
+"""m before the stop up to which the way counts as free: a touch at the search's speed is noticed sooner."""
+
+ZEROED_BY = 10
+"""Packets of free way that give a better zero than zeroing did."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,9 +125,6 @@ class ContactMotion:
     def longest(self, speeds: "Speeds") -> float:
         """M of the way from the stand-off on where nothing is met."""
         return self.search + (speeds.overtravel if self.overtravel is None else self.overtravel)
-
-
-_ARRAYS = ("start_rad", "travel_rad", "base_from_stand_off", "axis_in_base")
 
 
 @dataclass(frozen=True)
@@ -282,3 +303,36 @@ class PressPerformer:
 def _moved(attitude: FloatArray, position: FloatArray, by: FloatArray) -> FloatArray:
     """The planned attitude (a measured one would carry its noise into the press) at a measured place."""
     return transform(attitude[:3, :3], position[:3, 3] + by)
+
+
+def first_touch(history: Sequence[Reading], axis: FloatArray, force: float) -> float:
+    """Metres along ``axis`` from the base's origin to where the flange was when the gel touched.
+
+    Args:
+        history: packets of the search, from its start to its stop.
+        axis: ``(3,)`` unit in base: the way of the search.
+        force: N of mean resistance that is a touch; half of what stopped the search.
+
+    Raises:
+        BenchFault: the arm's packets have no poses or no forces.
+    """
+    named = {reading.channel.name: reading for reading in history}
+    try:
+        poses, wrenches = named["arm.base_from_flange"], named["arm.wrench"]
+    except KeyError as missing:
+        raise BenchFault(f"arm: its packets have no {missing}; check the recipe of its stream") from missing
+    along = poses.values[:, :3] @ axis
+    resistance = -(wrenches.values[:, :3] @ axis)
+    free = along < along[-1] - FREE
+    if np.count_nonzero(free) >= ZEROED_BY:
+        resistance = resistance - resistance[free].mean()
+    seconds = float(poses.times[-1] - poses.times[0])
+    count = max(1, round(AVERAGED * (len(along) - 1) / seconds)) if seconds > AVERAGED else 1
+    window = np.full(count, 1.0 / count)
+    way, mean = (np.convolve(values, window, mode="valid") for values in (along, resistance))
+    met = np.flatnonzero(mean >= force)
+    if len(met) == 0 or met[0] == 0:
+        return float(along[-1])
+    after = int(met[0])
+    share = (force - mean[after - 1]) / (mean[after] - mean[after - 1])
+    return float(way[after - 1] + share * (way[after] - way[after - 1]))

@@ -20,7 +20,6 @@ from harness.bench.reading import Channel, Reading
 from harness.bench.scene import SceneFile
 from harness.bench.station import STRIKE, Bench
 from harness.bench.station_file import Station
-from harness.skills.search import SearchGuard, meets
 from harness.twin.bench import TwinBench
 from harness.twin.strike_motion import PlannedStrike, StrikePlanner
 
@@ -49,6 +48,8 @@ FARTHEST = 0.01
 
 Ask = Callable[[str], None]
 """Shows a person what to do now."""
+
+_ARRAYS = ("start_rad", "travel_rad", "base_from_ready", "base_from_firing", "axis_in_base")
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +98,6 @@ class StrikeMotion:
         )
 
 
-_ARRAYS = ("start_rad", "travel_rad", "base_from_ready", "base_from_firing", "axis_in_base")
-
-
 @dataclass(frozen=True)
 class StrikeSpeeds:
     """How fast the arm may go near the object (SI).
@@ -134,6 +132,19 @@ def planner(
     if hammer.strike != "arm":
         return None
     return StrikePlanner(bench, flange_from_hammer, hammer.stand_off, travels)
+
+
+@dataclass(frozen=True)
+class SearchGuard:
+    """How a way is followed that may end at any place.
+
+    Attributes:
+        speed: m/s.
+        force: N of resistance that end it.
+    """
+
+    speed: float
+    force: float
 
 
 def strike(
@@ -268,3 +279,23 @@ def _pose(bench: Bench) -> Reading:
     pose = state.base_from_flange
     value = np.concatenate([pose[:3, 3], quaternion_from_rotation(pose[:3, :3])])
     return Reading(Channel(POSE, "m, 1", (7,), "float64", "base"), np.array([state.time]), value[None])
+
+
+def meets(bench: Bench, axis: FloatArray, travel: float, guard: SearchGuard) -> bool:
+    """Move along an axis until something resists; a long way in pieces, as the station limits a search.
+
+    Args:
+        bench: whose arm moves.
+        axis: ``(3,)`` unit in base.
+        travel: m.
+        guard: how.
+
+    Returns:
+        False where nothing was met; the arm is then at the end of the way.
+    """
+    left, longest = travel, bench.station.arm.safety.travel
+    while left > longest:
+        if bench.arm.move_until_contact(axis, guard.speed, guard.force, longest):
+            return True
+        left -= longest
+    return bench.arm.move_until_contact(axis, guard.speed, guard.force, left)

@@ -5,14 +5,20 @@ from typing import Any, Final
 
 import mujoco
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from harness.basics.arrays import FloatArray, read_only
-from harness.basics.geometry import transform
+from harness.basics.geometry import apply, transform
 from harness.bench.ur_tables import LINKS, TWIST_COSINES, TWIST_SINES, ArmTable, arm_table
 from harness.twin.link_hulls import link_hulls
 
 ARM_COLOUR: Final = (0.72, 0.74, 0.77, 1.0)
 JOINT_COLOUR: Final = (0.35, 0.52, 0.68, 1.0)
+
+NAME: Final = "hammer"
+SOLENOID_RADIUS: Final = 0.012  # m
+TIP_RADIUS: Final = 0.004  # m
+TIP_LENGTH: Final = 0.02  # m, from the tip at rest back to the solenoid
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,3 +124,18 @@ def _quaternion(rotation: FloatArray) -> FloatArray:
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, rotation.ravel())
     return quaternion
+
+
+def striker(flange_from_hammer: FloatArray) -> Part:
+    """The hammer at rest in the flange's frame: a slender body from the flange's middle to the tip.
+
+    Args:
+        flange_from_hammer: ``(4, 4)``, origin at the tip, z along the strike.
+    """
+    angles = np.linspace(0.0, 2 * np.pi, 12, endpoint=False)
+    ring = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(12)])
+    back = np.array([0.0, 0.0, -TIP_LENGTH])
+    front = apply(flange_from_hammer, np.concatenate([TIP_RADIUS * ring, SOLENOID_RADIUS * ring + back]))
+    root = SOLENOID_RADIUS * ring + np.array([0.0, 0.0, SOLENOID_RADIUS])
+    points = np.concatenate([front, root])
+    return Part(NAME, 6, points[ConvexHull(points).vertices])

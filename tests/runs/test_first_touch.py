@@ -6,7 +6,7 @@ import pytest
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault
 from harness.bench.reading import Channel, Reading
-from harness.skills.first_touch import first_touch
+from harness.skills.press import first_touch
 
 AXIS = np.array([0.0, 0.6, -0.8])
 START = np.array([-0.4, 0.1, 0.5])

@@ -6,11 +6,17 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from harness.authoring.touch.codes import CodedSurface, PatchSpec, code_surface
 from harness.authoring.touch.data import DEPTHS, MOST_TILT, choose_nodes
 from harness.authoring.touch.metrics import PressBench
 from harness.authoring.touch.profiles import touch_profile
-from harness.authoring.touch.touch import OFF, opened_codes, spaced_codes
+from harness.authoring.touch.touch import (
+    OFF,
+    CodedSurface,
+    PatchSpec,
+    code_surface,
+    opened_codes,
+    spaced_codes,
+)
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import GELSIGHT_R15, TactileSensor

@@ -17,9 +17,8 @@ from experiments.baselines.sound.spectrogram import (
     spectrum_pair,
 )
 from experiments.baselines.stored_graph import stored_graph
-from harness.authoring.audio.audio import opened
+from harness.authoring.audio.audio import opened, waves_graph
 from harness.authoring.audio.data import SoundSamples, wave_number
-from harness.authoring.audio.export import waves_graph
 from harness.authoring.audio.object_audio import MODES
 from harness.authoring.audio.profiles import PROFILES, WavesSpec
 from harness.authoring.audio.waves import fit_enough_waves

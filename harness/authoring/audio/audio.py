@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from onnx import ModelProto
+from onnx import ModelProto, TensorProto, helper
 from threadpoolctl import threadpool_limits
 
 from harness.authoring.audio.data import SoundSamples, Split, split_nodes, wave_number
-from harness.authoring.audio.export import waves_graph
 from harness.authoring.audio.metrics import (
     DURATION,
     RATE,
@@ -20,12 +19,13 @@ from harness.authoring.audio.metrics import (
     sound_distances,
 )
 from harness.authoring.audio.profiles import AudioProfile, PerceptronSpec
-from harness.authoring.audio.waves import fit_enough_waves
+from harness.authoring.audio.waves import Waves, fit_enough_waves
 from harness.authoring.training import Report, median_seconds, train
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.objectfile.audio.graph import audio_graph
 from harness.objectfile.audio.part import NETWORK, network_tensors
 from harness.objectfile.audio.table import scaled
+from harness.objectfile.graph import Nodes, Normaliser, Storage
 from harness.objectfile.runtime import Network
 from harness.sim.modal.modes import Modes
 from harness.sim.modal.stage_seconds import timed
@@ -199,3 +199,30 @@ def _sound_errors(
         "stft_distance_worst": float(np.max([each.stft for each in distances])),
         "envelope_distance_worst": float(np.max([each.envelope for each in distances])),
     }
+
+
+def waves_graph(network: Waves, storage: Storage = "float32") -> ModelProto:
+    """Plane waves as a graph; its input and output are those of ``audio_graph``.
+
+    Args:
+        network: to write.
+        storage: of the linear layer in the file; the waves themselves are float32, as a wave
+            vector that is off turns far ends of the object.
+    """
+    modes = network.weights.shape[1] // 3
+    nodes = Nodes(storage)
+    place = nodes.normalised("points", Normaliser(network.shift, np.full(3, network.factor)))
+    vectors = nodes.constant(network.vectors.astype(np.float32))
+    phases = nodes.constant(network.phases.astype(np.float32))
+    waves = nodes.add("Sin", nodes.add("Gemm", place, vectors, phases))
+    seen = nodes.add("Concat", waves, place, axis=1)
+    weights = nodes.weight(network.weights[:-1], "the linear layer")
+    offsets = nodes.weight(network.weights[-1], "the linear layer's offset")
+    flat = nodes.add("Gemm", seen, weights, offsets)
+    nodes.add("Reshape", flat, nodes.constant(np.array([-1, modes, 3])), name="gains")
+    return nodes.model(
+        "audio",
+        [helper.make_tensor_value_info("points", TensorProto.DOUBLE, ["n", 3])],
+        [helper.make_tensor_value_info("gains", TensorProto.FLOAT, ["n", modes, 3])],
+        "Points (n, 3), m in the object's frame, to mass-normalised mode shapes (n, m, 3), 1/sqrt(kg).",
+    )

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from harness.authoring.adam_state import load_training, save_training
 from harness.authoring.audio.data import between_nodes
 from harness.authoring.audio.profiles import PerceptronSpec
-from harness.authoring.audio.readout import error_shares, solve_readout
+from harness.authoring.audio.waves import error_shares, solve_readout
 from harness.authoring.checkpoint import TrainingProgress
 from harness.authoring.perceptron import arrays_of, dense_layers, encode, set_rate
 from harness.basics.arrays import AnyArray, FloatArray, IntArray

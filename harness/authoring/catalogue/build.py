@@ -4,17 +4,31 @@ import fcntl
 import os
 import shutil
 import socket
-from collections.abc import Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing.connection import wait
+from typing import Protocol
 
-from harness.authoring.catalogue.layout import BuildFolder
-from harness.authoring.catalogue.record import PASSING, ObjectRecord, read_record, stands
+from harness.authoring.catalogue.layout import (
+    PASSING,
+    BuildFolder,
+    ObjectRecord,
+    Outcome,
+    read_record,
+    stands,
+)
 from harness.authoring.catalogue.rows import CatalogueRow
-from harness.authoring.catalogue.runner import Runner
 from harness.authoring.catalogue.spec import BuildItem, BuildSpec, build_item
-from harness.authoring.catalogue.worker import Job
+from harness.authoring.catalogue.worker import Job, ObjectWorker, WorkerLimits
 from harness.basics.errors import WrongUse
+
+ATTEMPTS = 2
+"""Of an object whose process died: the first may have died of its neighbours' hunger for memory."""
+
+RETRIED: frozenset[Outcome] = frozenset({"crashed", "out of memory"})
+"""Outcomes after which an object gets another attempt."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +80,16 @@ def _failed_for_good(record: ObjectRecord, key: str) -> bool:
     return not record.built and record.key == key and record.outcome not in PASSING
 
 
+class Runner(Protocol):
+    """Builds objects side by side."""
+
+    def run(self, jobs: Iterable[Job]) -> Iterator[ObjectRecord]:
+        """The record of every job, each when it is over, in any order; each is on the disk by then.
+
+        Whoever stops taking records, or is interrupted, stops the jobs that run.
+        """
+
+
 def build_all(plan: BuildPlan, spec: BuildSpec, of: BuildFolder, runner: Runner) -> Iterator[ObjectRecord]:
     """Build the waiting objects in a folder that the caller holds; yields the record of each."""
     shutil.rmtree(of.aside, ignore_errors=True)
@@ -94,3 +118,59 @@ def held(of: BuildFolder) -> Iterator[None]:
         lock.write(f"process {os.getpid()} on {socket.gethostname()}\n")
         lock.flush()
         yield
+
+
+class LocalRunner:
+    """Processes of this machine, each with one object at a time.
+
+    Args:
+        workers: how many.
+        limits: of each.
+    """
+
+    def __init__(self, workers: int, limits: WorkerLimits) -> None:
+        self._workers = workers
+        self._limits = limits
+
+    def run(self, jobs: Iterable[Job]) -> Iterator[ObjectRecord]:
+        """As ``Runner.run``."""
+        waiting = deque((job, 1) for job in jobs)
+        workers: list[ObjectWorker] = []
+        try:
+            while waiting or any(worker.job for worker in workers):
+                self._hand_out(waiting, workers)
+                yield from self._finished(waiting, workers)
+        finally:
+            for worker in workers:
+                worker.stop()
+
+    def _hand_out(self, waiting: deque[tuple[Job, int]], workers: list[ObjectWorker]) -> None:
+        """A job for every idle worker; a worker for every job, up to their number."""
+        idle = [worker for worker in workers if worker.job is None]
+        while waiting and (idle or len(workers) < self._workers):
+            if not idle:
+                workers.append(ObjectWorker(self._limits))
+                idle.append(workers[-1])
+            idle.pop().begin(*waiting.popleft())
+
+    def _finished(
+        self, waiting: deque[tuple[Job, int]], workers: list[ObjectWorker]
+    ) -> Iterator[ObjectRecord]:
+        """Wait for something to end, and take all that has; what died once waits again."""
+        busy = [worker for worker in workers if worker.job is not None]
+        wait_for(busy)
+        for worker in busy:
+            job, attempt = worker.job, worker.attempt
+            record = worker.poll()
+            if record is None or job is None:
+                continue
+            if record.outcome in RETRIED and attempt < ATTEMPTS:
+                waiting.append((job, attempt + 1))
+            else:
+                yield record
+
+
+def wait_for(busy: Sequence[ObjectWorker]) -> None:
+    """Wait until one of some busy workers has ended its job, died, or is out of time."""
+    ends = [end for worker in busy for end in worker.waitables]
+    wait(ends, timeout=min(worker.seconds_left for worker in busy))

@@ -1,9 +1,28 @@
 """Where everything of a build lies in its folder."""
 
+import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
-from harness.objectfile.entries import Modality
+from pydantic import Field
+
+from harness.authoring.catalogue.rows import ExcludedRow
+from harness.basics.errors import CalibrationRefused, WrongUse
+from harness.basics.files.json_file import read_model, write_model
+from harness.basics.toml_file import StrictModel
+from harness.objectfile.entries import FileEntry, Modality
+from harness.objects.builtin import DESCRIPTION
+
+Outcome = Literal[
+    "built", "refused", "failed", "crashed", "out of time", "out of memory", "disk full", "worker lost"
+]
+"""``refused`` names the object's own fault, ``failed`` an exception and ``crashed`` a dead process of the
+program's making; the others are of the machines."""
+
+PASSING: frozenset[Outcome] = frozenset({"disk full", "worker lost"})
+"""Outcomes that are not of the object: the next build tries again."""
 
 
 @dataclass(frozen=True)
@@ -68,3 +87,145 @@ class BuildFolder:
         for name in ("objects", "records", "logs", "failed", "aside"):
             (self.folder / name).mkdir(parents=True, exist_ok=True)
         self.arrays.mkdir(parents=True, exist_ok=True)
+
+
+class ExcludedEntry(StrictModel):
+    """A row that was not built, and why."""
+
+    name: str
+    reason: str
+
+
+class BuildSettings(StrictModel):
+    """The last build of a folder.
+
+    Attributes:
+        schema_version: of this file.
+        catalogue: path of its file.
+        names: of the objects, in the catalogue's order.
+        excluded: rows that were not built.
+    """
+
+    schema_version: Literal[1] = Field(default=1, alias="schema")
+    catalogue: str
+    names: tuple[str, ...]
+    excluded: tuple[ExcludedEntry, ...] = ()
+
+
+def write_settings(
+    of: BuildFolder, catalogue: Path, names: Sequence[str], excluded: Sequence[ExcludedRow]
+) -> None:
+    """Note what is built now."""
+    entries = tuple(ExcludedEntry(name=row.name, reason=row.reason) for row in excluded)
+    write_model(BuildSettings(catalogue=str(catalogue), names=tuple(names), excluded=entries), of.settings)
+
+
+def read_settings(of: BuildFolder) -> BuildSettings:
+    """What was noted last.
+
+    Raises:
+        WrongUse: nothing was built into the folder.
+        CalibrationRefused: the file is damaged.
+    """
+    advice = "name the --out folder of `touchstone catalogue build`"
+    return read_model(of.settings, BuildSettings, "build of a catalogue", advice)
+
+
+class SenseRecord(StrictModel):
+    """One sense of an object.
+
+    Attributes:
+        key: of its stage.
+        made: whether this build computed it; false where it stood.
+        seconds: on the clock, of each part of the work when it was computed.
+        clock: what else was measured with a clock, by its name in ``object.json``.
+        remarks: what was done to the mesh and what to look at.
+    """
+
+    key: str
+    made: bool
+    seconds: dict[str, float] = Field(default_factory=dict)
+    clock: dict[str, float] = Field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+
+class ObjectRecord(StrictModel):
+    """One object.
+
+    Attributes:
+        schema_version: of this file.
+        name: of the object.
+        key: of all that it depends on.
+        outcome: what became of it.
+        reason: where it was not built.
+        seconds: s on the clock of the last attempt.
+        attempts: that it took.
+        host: that built it.
+        senses: by name.
+        object_json_bytes: size of the description; 0 where it was not built.
+        object_json_sha256: hash of the description; "" where it was not built.
+        files: that the description names.
+    """
+
+    schema_version: Literal[1] = Field(default=1, alias="schema")
+    name: str
+    key: str
+    outcome: Outcome
+    reason: str = ""
+    seconds: float = 0.0
+    attempts: int = 1
+    host: str = ""
+    senses: dict[Modality, SenseRecord] = Field(default_factory=dict)
+    object_json_bytes: int = 0
+    object_json_sha256: str = ""
+    files: tuple[FileEntry, ...] = ()
+
+    @property
+    def built(self) -> bool:
+        """Whether there is an ObjectFile."""
+        return self.outcome == "built"
+
+
+def write_record(record: ObjectRecord, of: BuildFolder) -> None:
+    """Keep a record: of a built object among the records, of another one with its log in ``failed``.
+
+    Raises:
+        OSError: the disk is full.
+    """
+    apart = of.failed(record.name)
+    if record.built:
+        write_model(record, of.record(record.name))
+        shutil.rmtree(apart, ignore_errors=True)
+        return
+    apart.mkdir(parents=True, exist_ok=True)
+    if of.log(record.name).is_file():
+        shutil.copyfile(of.log(record.name), apart / "log.txt")
+    write_model(record, apart / "record.json")
+
+
+def read_record(of: BuildFolder, name: str) -> ObjectRecord | None:
+    """The record of the last attempt; None where there is none that reads."""
+    return _read(of.failed(name) / "record.json") or _read(of.record(name))
+
+
+def stands(of: BuildFolder, record: ObjectRecord | None, key: str) -> bool:
+    """Whether an object was built from just this and its files are there, by name and size."""
+    if record is None or not record.built or record.key != key:
+        return False
+    folder = of.object(record.name)
+    sizes = {DESCRIPTION: record.object_json_bytes, **{entry.file: entry.bytes for entry in record.files}}
+    return all(_size(folder / name) == size for name, size in sizes.items())
+
+
+def _size(path: Path) -> int | None:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return None
+
+
+def _read(path: Path) -> ObjectRecord | None:
+    try:
+        return read_model(path, ObjectRecord, "record of a build", "delete it and build again")
+    except (WrongUse, CalibrationRefused):
+        return None

@@ -9,9 +9,7 @@ from pathlib import Path
 from fsspec.core import url_to_fs
 from fsspec.spec import AbstractFileSystem
 
-from harness.authoring.catalogue.layout import BuildFolder
-from harness.authoring.catalogue.record import ObjectRecord, read_record, stands
-from harness.authoring.catalogue.settings import read_settings
+from harness.authoring.catalogue.layout import BuildFolder, ObjectRecord, read_record, read_settings, stands
 from harness.basics.errors import DataRefused, WrongUse
 from harness.objects.builtin import DESCRIPTION
 

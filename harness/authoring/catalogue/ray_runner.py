@@ -12,8 +12,8 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from typing import Any
 
-from harness.authoring.catalogue.record import ObjectRecord
-from harness.authoring.catalogue.runner import ATTEMPTS, RETRIED, wait_for
+from harness.authoring.catalogue.build import ATTEMPTS, RETRIED, wait_for
+from harness.authoring.catalogue.layout import ObjectRecord
 from harness.authoring.catalogue.unit import failure
 from harness.authoring.catalogue.worker import Job, ObjectWorker, WorkerLimits
 from harness.basics.errors import BenchFault, WrongUse

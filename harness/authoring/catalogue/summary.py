@@ -4,9 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from harness.authoring.catalogue.layout import BuildFolder
-from harness.authoring.catalogue.record import ObjectRecord, read_record, stands
-from harness.authoring.catalogue.settings import read_settings
+from harness.authoring.catalogue.layout import BuildFolder, ObjectRecord, read_record, read_settings, stands
 from harness.basics.errors import TouchstoneError
 from harness.objectfile.description import Description
 from harness.objectfile.file import ObjectFile

@@ -18,8 +18,7 @@ from pathlib import Path
 import numba
 from threadpoolctl import threadpool_limits
 
-from harness.authoring.catalogue.layout import BuildFolder
-from harness.authoring.catalogue.record import ObjectRecord, Outcome, write_record
+from harness.authoring.catalogue.layout import BuildFolder, ObjectRecord, Outcome, write_record
 from harness.authoring.catalogue.spec import BuildItem, BuildSpec
 from harness.authoring.catalogue.unit import build_object, failure
 from harness.basics.worker_pool import end_without_parent

@@ -43,8 +43,7 @@ def read(
     Raises:
         WrongUse: no such catalogue, or a material that is none.
     """
-    from harness.authoring.catalogue.mesh_search import with_meshes
-    from harness.authoring.catalogue.rows import of_materials, read_catalogue
+    from harness.authoring.catalogue.rows import of_materials, read_catalogue, with_meshes
 
     chosen = of_materials(read_catalogue(catalogue), materials or [])
     rows, without = with_meshes(chosen.rows, meshes or catalogue.parent)

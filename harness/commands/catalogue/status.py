@@ -24,8 +24,7 @@ def status(folder: BuiltFolder, json: options.Json = False) -> int:
 
     Try: touchstone catalogue status built
     """
-    from harness.authoring.catalogue.layout import BuildFolder
-    from harness.authoring.catalogue.settings import read_settings
+    from harness.authoring.catalogue.layout import BuildFolder, read_settings
     from harness.authoring.catalogue.summary import summaries
 
     of = BuildFolder(folder)
@@ -57,8 +56,7 @@ def page(
 
     Try: touchstone catalogue page built
     """
-    from harness.authoring.catalogue.layout import BuildFolder
-    from harness.authoring.catalogue.settings import read_settings
+    from harness.authoring.catalogue.layout import BuildFolder, read_settings
     from harness.authoring.catalogue.summary import summaries
     from harness.report.catalogue_page import PAGE, write_catalogue_page
 

@@ -1,15 +1,16 @@
 """The steps of an exploration: a look, then contacts planned one by one on what is known by then."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.bench.reading import Reading
-from harness.bench.station import Bench
+from harness.bench.station import BARE, LOOK, Bench
+from harness.recording.look_pictures import BARE_IMAGE, IMAGE
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step
-from harness.skills.look import look
 from harness.skills.press import After, PressPerformer, Speeds
 from harness.skills.strike import Ask
 
@@ -24,6 +25,11 @@ SPEEDS = Speeds(approach=0.02)
 
 MOST_SKIPPED = 3
 """Contacts in a row without a free way, each looked for anew, after which a run makes no more."""
+
+FRAMES = 3
+"""Of each: their median has less of the camera's noise."""
+
+_PATIENCE = 5.0
 
 
 class NextContact(Protocol):
@@ -105,3 +111,35 @@ class Exploration:
         if step.kind == "look":
             return look(step.index, bench, self._ask)
         return self._press.perform(step, bench)
+
+
+def look(step: int, bench: Bench, ask: Ask | None) -> tuple[Reading, ...]:
+    """Both pictures; a person takes the object away and puts it back, a mocked world does so by itself.
+
+    Args:
+        step: of the run.
+        bench: with a scene camera.
+        ask: shows a person what to do; None where nobody is there.
+
+    Raises:
+        WrongUse: the bench has no scene camera, or nobody is there to clear a real one.
+        BenchFault: the camera sends nothing.
+    """
+    if bench.camera is None:
+        raise WrongUse("a look needs the scene camera: set sensors.camera = true, or leave vision out")
+    if ask is None and bench.lab is None and bench.station.mock is None:
+        raise WrongUse(
+            "the camera must see the bench without the object first, and nobody can be asked to clear it; "
+            "run without --json at a terminal"
+        )
+    readings = []
+    for sample, name, request in (
+        (BARE, BARE_IMAGE, "take the object off the bench"),
+        (LOOK, IMAGE, "put the object where it stood"),
+    ):
+        if ask is not None and bench.station.mock is None:
+            ask(f"{request}, then go on")
+        bench.mark(step, sample)
+        reading = bench.camera.read(FRAMES, _PATIENCE)
+        readings.append(replace(reading, channel=replace(reading.channel, name=name)))
+    return tuple(readings)

@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.table import Table
 from threadpoolctl import threadpool_limits
 
-from harness.authoring.audio.export import waves_graph
+from harness.authoring.audio.audio import waves_graph
 from harness.authoring.audio.profiles import PROFILES, PerceptronSpec
 from harness.authoring.audio.waves import Waves
 from harness.basics.materials import MATERIALS

@@ -23,11 +23,9 @@ from scipy.interpolate import CubicSpline
 
 from harness.basics.arrays import FloatArray
 from harness.report.figures.style import ANSWER, SOFT, TOOL, blank, styled
-from harness.strikes.blow import measure_blow
-from harness.strikes.frequency_response import frequency_response
+from harness.strikes.frequency_response import frequency_response, measure_blow
 from harness.strikes.modal_identification import Identified, IdentifiedMode, modes_of_decay, modes_of_response
-from harness.strikes.pole_fit import ComplexArray
-from harness.strikes.pole_search import PoleSearch
+from harness.strikes.pole_fit import ComplexArray, PoleSearch
 from tests.oracles.measured_beams import (
     HAMMER_RATE,
     RULER_STEP,

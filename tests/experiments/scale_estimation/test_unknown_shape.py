@@ -18,8 +18,7 @@ from harness.objects.builtin import build
 from harness.picture.outline import SeenOutline
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.skills.exploring.envelope import margin_of
-from harness.skills.exploring.unknown_space import unknown_space
+from harness.skills.exploring.unknown_space import margin_of, unknown_space
 from harness.skills.strike import POSE
 from harness.twin.rehearsal import rehearse
 from tests.experiments.scale_estimation.runs import answering_of, outside, ran, scene_of, travels, true_mesh

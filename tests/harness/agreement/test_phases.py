@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from harness.agreement.phases import PhaseNoise, is_single, phase_score
+from harness.agreement.sound import PhaseNoise, is_single, phase_score
 from harness.basics.arrays import FloatArray
 from harness.strikes.peaks import Peak
 from harness.strikes.spectra import ComplexArray

@@ -8,8 +8,7 @@ import pytest
 from scipy.stats import chi2
 
 from harness.agreement.arm import TABLES, joint_residual
-from harness.agreement.likeliest import SurfaceNoise, Surfaces
-from harness.agreement.touch import surface_residual
+from harness.agreement.touch import SurfaceNoise, Surfaces, surface_residual
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import quaternion_from_rotation
 from harness.bench import kinematics

@@ -11,12 +11,10 @@ from experiments.contact_localization.accuracy.benchmark_runs import Cell
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.section import Localization
 from harness.agreement.compare_run import agreement_of
-from harness.agreement.likeliest import SurfaceNoise, likeliest
 from harness.agreement.place_noise import PlaceNoise
-from harness.agreement.readings import contacts_of
 from harness.agreement.stated_error import gain_error, map_errors
-from harness.agreement.subject import Subject, own_subject, subject_of_file
-from harness.agreement.touch import compare_touch
+from harness.agreement.subject import Subject, contacts_of, own_subject, subject_of_file
+from harness.agreement.touch import SurfaceNoise, compare_touch, likeliest
 from harness.basics.errors import WrongUse
 from harness.bench.scene import scene_from_options
 from harness.bench.scene_objectfile import shipped_objectfiles

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, special_ortho_group
 
-from harness.agreement.phases import PhaseNoise
-from harness.agreement.strike_shares import (
+from harness.agreement.sound import (
+    PhaseNoise,
     ShareNoise,
     StruckModes,
     gain_score,

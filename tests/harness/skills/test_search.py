@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.skills.search import SearchGuard, meets
+from harness.skills.strike import SearchGuard, meets
 
 LONGEST = 0.2
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, WrongUse
-from harness.strikes.blow import measure_blow
+from harness.strikes.frequency_response import measure_blow
 
 RATE = 25600.0
 SAMPLES = 2000

@@ -11,7 +11,7 @@ from harness.basics.errors import DataRefused
 from harness.sim.sound.modal_sound import ring
 from harness.strikes.frequency_response import FrequencyResponse, frequency_response
 from harness.strikes.modal_identification import modes_of_decay, modes_of_response
-from harness.strikes.pole_search import PoleSearch
+from harness.strikes.pole_fit import PoleSearch
 from tests.samples.blows import half_sine
 
 RATE = 8000.0

@@ -10,8 +10,7 @@ from harness.basics.clipping import is_clipped
 from harness.basics.errors import DataRefused, WrongUse
 from harness.sim.sound.modal_sound import impulse_response
 from harness.strikes.modal_identification import Identified, modes_of_decay, modes_of_response
-from harness.strikes.pole_fit import ComplexArray, SpectralLines, fit_poles
-from harness.strikes.pole_search import PoleSearch
+from harness.strikes.pole_fit import ComplexArray, PoleSearch, SpectralLines, fit_poles
 from tests.oracles.measured_beams import beam_roots, free_shape
 
 RATE = 4000.0

@@ -14,10 +14,9 @@ from scipy.signal import find_peaks
 from harness.basics.arrays import FloatArray
 from harness.bench.acquisition import shipped_acquisition, strike_from_readings
 from harness.bench.acquisition_channels import BLOCK, CaptureForm, readings_of_capture
-from harness.strikes.blow import Blow, measure_blow
-from harness.strikes.frequency_response import frequency_response
+from harness.strikes.frequency_response import Blow, frequency_response, measure_blow
 from harness.strikes.modal_identification import Identified, IdentifiedMode, modes_of_decay, modes_of_response
-from harness.strikes.pole_search import PoleSearch
+from harness.strikes.pole_fit import PoleSearch
 from tests.oracles.measured_beams import (
     HAMMER_RATE,
     MAINS,

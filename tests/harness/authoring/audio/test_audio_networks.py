@@ -5,13 +5,18 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from harness.authoring.audio.audio import author_audio, opened
+from harness.authoring.audio.audio import author_audio, opened, waves_graph
 from harness.authoring.audio.data import SoundSamples, split_nodes, wave_number
-from harness.authoring.audio.export import waves_graph
 from harness.authoring.audio.metrics import interpolated, relative_errors
 from harness.authoring.audio.profiles import AudioProfile, WavesSpec, profile
-from harness.authoring.audio.readout import error_shares, solve_readout
-from harness.authoring.audio.waves import ENOUGH, FittedWaves, fit_enough_waves, fit_waves
+from harness.authoring.audio.waves import (
+    ENOUGH,
+    FittedWaves,
+    error_shares,
+    fit_enough_waves,
+    fit_waves,
+    solve_readout,
+)
 from harness.basics.errors import WrongUse
 from harness.objectfile.graph import Storage
 from harness.sim.modal.modes import Modes

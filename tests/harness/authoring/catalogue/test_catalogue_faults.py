@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from harness.authoring.catalogue.build import LocalRunner
 from harness.authoring.catalogue.layout import BuildFolder
-from harness.authoring.catalogue.runner import LocalRunner
 from harness.authoring.catalogue.worker import WorkerLimits
 from tests.samples.tiny_catalogue import all_bytes, block, tiny_job
 

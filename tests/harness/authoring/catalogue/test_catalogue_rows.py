@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.authoring.catalogue.mesh_search import with_meshes
-from harness.authoring.catalogue.rows import CatalogueRow, of_materials, read_catalogue
+from harness.authoring.catalogue.rows import CatalogueRow, of_materials, read_catalogue, with_meshes
 from harness.basics.errors import WrongUse
 from harness.basics.materials import MATERIALS
 

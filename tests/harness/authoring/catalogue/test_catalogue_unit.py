@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from harness.authoring.catalogue.build import build_plan, held
-from harness.authoring.catalogue.layout import BuildFolder
-from harness.authoring.catalogue.record import ObjectRecord, read_record, stands
+from harness.authoring.catalogue.layout import BuildFolder, ObjectRecord, read_record, stands
 from harness.authoring.catalogue.spec import BuildSpec, build_item
 from harness.authoring.catalogue.unit import build_object
 from harness.authoring.catalogue.worker import Job

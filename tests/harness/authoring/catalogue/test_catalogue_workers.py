@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.authoring.catalogue.layout import BuildFolder
-from harness.authoring.catalogue.record import read_record
-from harness.authoring.catalogue.runner import LocalRunner, wait_for
+from harness.authoring.catalogue.build import LocalRunner, wait_for
+from harness.authoring.catalogue.layout import BuildFolder, read_record
 from harness.authoring.catalogue.spec import BuildSpec
 from harness.authoring.catalogue.worker import ObjectWorker, WorkerLimits
 from tests.samples.tiny_catalogue import tiny_job

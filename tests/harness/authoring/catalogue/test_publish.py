@@ -6,9 +6,8 @@ from pathlib import Path
 import fsspec
 import pytest
 
-from harness.authoring.catalogue.layout import BuildFolder
+from harness.authoring.catalogue.layout import BuildFolder, read_record
 from harness.authoring.catalogue.publish import ObjectStore, publish
-from harness.authoring.catalogue.record import read_record
 from harness.basics.errors import DataRefused, WrongUse
 from harness.cli import invoke
 from harness.objectfile.file import ObjectFile

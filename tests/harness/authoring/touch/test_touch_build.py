@@ -7,10 +7,9 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from harness.authoring.touch.codes import PatchSpec, patch_bytes
 from harness.authoring.touch.data import choose_nodes
 from harness.authoring.touch.profiles import touch_profile
-from harness.authoring.touch.touch import COARSENED, SPACINGS, spaced_codes
+from harness.authoring.touch.touch import COARSENED, SPACINGS, PatchSpec, patch_bytes, spaced_codes
 from harness.basics.errors import WrongUse
 from harness.bench.sensor import GELSIGHT_R15
 from harness.cli import invoke

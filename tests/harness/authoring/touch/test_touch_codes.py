@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from harness.authoring.touch.codes import code_surface, principal
 from harness.authoring.touch.data import DEPTHS, MOST_TILT, choose_nodes, draw_presses, reference_maps
 from harness.authoring.touch.metrics import psnr
-from harness.authoring.touch.touch import opened_codes
+from harness.authoring.touch.touch import code_surface, opened_codes, principal
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh

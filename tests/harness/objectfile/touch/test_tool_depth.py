@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.authoring.touch.codes import code_surface
 from harness.authoring.touch.data import choose_nodes
-from harness.authoring.touch.touch import OFF
+from harness.authoring.touch.touch import OFF, code_surface
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.geometry import frame_facing, transform

@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
-from harness.skills.exploring.envelope import around
+from harness.skills.exploring.unknown_space import around
 
 SUPPORT = 0.25
 ROUNDOFF = 1e-12

@@ -6,7 +6,7 @@ import pytest
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_about, transform
 from harness.bench.sensor import GELSIGHT_R15
-from harness.skills.exploring.sensor_face import MIDDLE, face_places, gel_first, ways_of
+from harness.skills.exploring.lines import MIDDLE, face_places, gel_first, ways_of
 
 PLACES = face_places(GELSIGHT_R15.housing, GELSIGHT_R15.gel_thickness)
 
