@@ -147,7 +147,27 @@ class Agreement:
             "fits": self.fits,
             "false_alarm": self.false_alarm,
             "first_in_doubt": None if doubt is None else {"step": doubt[0] + 1, "sense": doubt[1]},
-            "senses": [_sense_json(one) for one in self.senses],
+            "senses": [
+                {
+                    "sense": one.compared.sense,
+                    "compared_with": one.compared.source,
+                    "verdict": one.verdict,
+                    "why": one.compared.why or None,
+                    "seconds": one.compared.seconds,
+                    "residuals": [
+                        {
+                            "step": residual.step + 1,
+                            "quantity": residual.quantity,
+                            "chi_square": residual.chi_square,
+                            "dof": residual.dof,
+                            "limit": limit,
+                            "numbers": dict(residual.numbers),
+                        }
+                        for residual, limit in zip(one.compared.residuals, one.limits, strict=True)
+                    ],
+                }
+                for one in self.senses
+            ],
         }
 
     def sentences(self) -> list[str]:
@@ -187,27 +207,6 @@ def _judged(one: SenseResiduals, rate: float) -> JudgedSense:
     limits = tuple(np.atleast_1d(chi2.isf(each, [residual.dof for residual in one.residuals])).tolist())
     beyond = any(r.chi_square > limit for r, limit in zip(one.residuals, limits, strict=True))
     return JudgedSense(one, "does not fit" if beyond else "fits", limits)
-
-
-def _sense_json(one: JudgedSense) -> dict[str, Any]:
-    return {
-        "sense": one.compared.sense,
-        "compared_with": one.compared.source,
-        "verdict": one.verdict,
-        "why": one.compared.why or None,
-        "seconds": one.compared.seconds,
-        "residuals": [
-            {
-                "step": residual.step + 1,
-                "quantity": residual.quantity,
-                "chi_square": residual.chi_square,
-                "dof": residual.dof,
-                "limit": limit,
-                "numbers": dict(residual.numbers),
-            }
-            for residual, limit in zip(one.compared.residuals, one.limits, strict=True)
-        ],
-    }
 
 
 def _sentence(one: JudgedSense) -> str:

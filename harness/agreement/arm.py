@@ -95,7 +95,11 @@ def contact_depth(
 ) -> ContactDepth:
     """One contact's depth, and how far each error moves it."""
     pose = contact.seen.base_from_gel
-    slope = _slope(bench, pose)
+    changes = []
+    for twist in np.diag(_STEPS):
+        ahead, behind = (_reached(bench, twisted(pose, sign * twist), _NOTHING) for sign in (1.0, -1.0))
+        changes.append(ahead - behind)
+    slope = np.asarray(np.array(changes) / (2.0 * _STEPS))
     read, expected = max(0.0, float(contact.heights.max())), _reached(bench, pose)
     shared = slope @ shared_twists(noise, pose, base_from_object[:3, 3])
     own = float(np.sqrt(slope @ noise.own @ slope + READ**2 + (GAIN * read) ** 2))
@@ -121,17 +125,6 @@ def depth_residuals(depths: Sequence[ContactDepth]) -> tuple[Residual, ...]:
         )
         for depth, innovation, sigma in zip(depths, innovations, np.diag(root), strict=True)
     )
-
-
-def _slope(bench: TwinBench, base_from_gel: FloatArray) -> FloatArray:
-    """``(6,)``: change of the depth with the gel's twist, m per m and m per rad."""
-    changes = []
-    for twist in np.diag(_STEPS):
-        ahead, behind = (
-            _reached(bench, twisted(base_from_gel, sign * twist), _NOTHING) for sign in (1.0, -1.0)
-        )
-        changes.append(ahead - behind)
-    return np.asarray(np.array(changes) / (2.0 * _STEPS))
 
 
 def _reached(bench: TwinBench, base_from_gel: FloatArray, least: float = 0.0) -> float:

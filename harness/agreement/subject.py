@@ -25,7 +25,6 @@ from harness.picture.square_pixels import aspect_stated
 from harness.recording.observation import Observation, in_time, observe_step, picture_left_out
 from harness.recording.run_folder import RunFiles
 from harness.sim.optics.inverse import heights_or_refusal
-from harness.sim.optics.tactile_calibration import TactileCalibration
 
 SEEN = 0.12e-3
 """m of indentation at the deepest place, below which a picture shows no contact."""
@@ -190,15 +189,11 @@ def contacts_of(run: RunFiles) -> tuple[PressedContact, ...]:
         [observe_step(record, run.station.flange_from_gel, run.acquisition, aspect) for record in records]
     )
     return tuple(
-        _contact(record.step.index, one, run.calibration) for record, one in zip(records, seen, strict=True)
+        PressedContact(record.step.index, one, *heights_or_refusal(one.images, run.calibration))
+        for record, one in zip(records, seen, strict=True)
     )
 
 
 def refusal_notes(contacts: Sequence[PressedContact]) -> list[str]:
     """A sentence for each picture that is not compared."""
     return [picture_left_out(one.step, one.refusal) for one in contacts if one.refusal]
-
-
-def _contact(step: int, seen: Observation, calibration: TactileCalibration) -> PressedContact:
-    """With its surface from the mean of its frames, where that is of the calibration's gel."""
-    return PressedContact(step, seen, *heights_or_refusal(seen.images, calibration))

@@ -21,18 +21,18 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault, MotionEnded, NotTouched
 from harness.basics.geometry import transform
 from harness.bench.device import Arm
-from harness.bench.reading import Reading
+from harness.bench.reading import Channel, Reading
 from harness.bench.station import PRESS, Bench
 from harness.bench.travel import Trajectory, travel
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step
 from harness.skills.strike import (
     FARTHEST,
+    READY,
     Ask,
     SearchGuard,
     StrikeMotion,
     meets,
-    ready_of,
     strike,
     strike_by_hand,
 )
@@ -226,7 +226,11 @@ class PressPerformer:
             return ()
         self._travel(motion, bench)
         guard = SearchGuard(self.speeds.approach, self.speeds.touch_force)
-        return (ready_of(motion, bench), *strike(motion, step.index, 0.0, bench, guard=guard))
+        ready = motion.travel[-1] if len(motion.travel) else motion.start
+        return (
+            Reading(Channel(READY, "rad", (6,), "float64"), np.array([bench.arm.state().time]), ready[None]),
+            *strike(motion, step.index, 0.0, bench, guard=guard),
+        )
 
     def _travel(self, motion: ContactMotion | StrikeMotion, bench: Bench) -> None:
         speeds = self.speeds
@@ -256,7 +260,9 @@ class PressPerformer:
         if self._explores and further > 0.0:
             arm.move_until_contact(motion.axis, self.speeds.press, self.speeds.press_force, further)
         else:
-            pressed = _moved(motion.base_from_stand_off, state.base_from_flange, further * motion.axis)
+            pressed = transform(
+                motion.base_from_stand_off[:3, :3], state.base_from_flange[:3, 3] + (further * motion.axis)
+            )
             self._line(arm, pressed, "press")
         return touched - float(motion.base_from_stand_off[:3, 3] @ motion.axis) - motion.search
 
@@ -298,11 +304,6 @@ class PressPerformer:
     def _line(self, arm: Arm, base_from_flange: FloatArray, phase: Literal["press", "retreat"]) -> None:
         speed = self.speeds.press if phase == "press" else self.speeds.retreat
         arm.move_line(base_from_flange, speed, self.speeds.acceleration)
-
-
-def _moved(attitude: FloatArray, position: FloatArray, by: FloatArray) -> FloatArray:
-    """The planned attitude (a measured one would carry its noise into the press) at a measured place."""
-    return transform(attitude[:3, :3], position[:3, 3] + by)
 
 
 def first_touch(history: Sequence[Reading], axis: FloatArray, force: float) -> float:

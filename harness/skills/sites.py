@@ -206,7 +206,9 @@ class _Search:
         """The place as the chain's next site; None where it cannot be. The cheap questions come first."""
         self.tally.drawn += 1
         so_far = [*self.before, *(site.point_in_object for site in self.sites)]
-        if not _may_follow(point, so_far, self.steps, self.presses.longest_step):
+        gaps = np.linalg.norm(np.array(so_far).reshape(-1, 3) - point, axis=1)
+        near = self.steps == "spread" or gaps[-1:].max(initial=0.0) <= self.presses.longest_step
+        if not bool(near and gaps.min(initial=np.inf) >= SHORTEST_STEP):
             return None
         self.tally.near += 1
         site = try_site(self.raster, self.sensor, self.base_from_object, point, normal, rng, self.presses)
@@ -234,12 +236,6 @@ def _none_found(search: _Search, count: int, longest: int) -> str:
         + (f"longer steps than {step:g} mm, spread ones, " if search.steps == "close" else "")
         + "or another pose of the object"
     )
-
-
-def _may_follow(point: FloatArray, so_far: list[FloatArray], steps: Steps, longest_step: float) -> bool:
-    gaps = np.linalg.norm(np.array(so_far).reshape(-1, 3) - point, axis=1)
-    near = steps == "spread" or gaps[-1:].max(initial=0.0) <= longest_step
-    return bool(near and gaps.min(initial=np.inf) >= SHORTEST_STEP)
 
 
 def try_site(
@@ -276,21 +272,16 @@ def try_site(
     base_from_gel = transform(
         base_from_object[:3, :3] @ object_from_gel, apply(base_from_object, gel_in_object[None])[0]
     )
-    return Site(
-        read_only(base_from_gel),
-        max(_LEAST_PRESS, indentation - _noticed_at(under_gel)),
-        float(under_gel.max() + indentation),
-        read_only(np.array(point_in_object)),
-        tilt,
-    )
-
-
-def _noticed_at(heights: FloatArray) -> float:
-    """Metres of indentation at the centre when the displaced volume is enough to be felt."""
-    levels = -np.sort(-heights[np.isfinite(heights)].ravel())
+    levels = -np.sort(-under_gel[np.isfinite(under_gel)].ravel())
     wanted = TOUCH_VOLUME / _PITCH**2
     # Pressed to the k-th highest place, the gel is displaced by all higher ones down to it.
     displaced = np.cumsum(levels) - levels * np.arange(1, len(levels) + 1)
     k = int(np.searchsorted(displaced, wanted))
     higher = float(levels[:k].sum())
-    return (wanted - higher) / k
+    return Site(
+        read_only(base_from_gel),
+        max(_LEAST_PRESS, indentation - ((wanted - higher) / k)),
+        float(under_gel.max() + indentation),
+        read_only(np.array(point_in_object)),
+        tilt,
+    )

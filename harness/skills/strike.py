@@ -212,12 +212,6 @@ def _blocked(motion: StrikeMotion, there: FloatArray, bench: Bench, guard: Searc
     return met
 
 
-def ready_of(motion: StrikeMotion, bench: Bench) -> Reading:
-    """The posture that a strike begins and ends in, to be recorded where no parameter says it."""
-    ready = motion.travel[-1] if len(motion.travel) else motion.start
-    return Reading(Channel(READY, "rad", (6,), "float64"), np.array([bench.arm.state().time]), ready[None])
-
-
 def strike_by_hand(step: int, bench: Bench, ask: Ask | None) -> tuple[Reading, ...]:
     """Ask a person to strike the place that was just touched, and listen.
 

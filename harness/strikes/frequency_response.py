@@ -430,7 +430,8 @@ def _above_rest(samples: FloatArray, rate: float) -> tuple[RestLine, FloatArray]
     for _ in range(_ROUNDS):
         risen = samples - rest
         top = int(np.argmax(risen))
-        loud = np.abs(risen) > max(_LOUD * risen[top], _ABOVE_NOISE * _spread(risen))
+        spread = 1.4826 * float(np.median(np.abs(risen - np.median(risen))))
+        loud = np.abs(risen) > max(_LOUD * risen[top], _ABOVE_NOISE * spread)
         begin, end = _event(loud, top, around)
         quiet = np.ones(len(samples), np.bool_)
         for place in np.flatnonzero(loud):
@@ -458,11 +459,6 @@ def _event(loud: BoolArray, top: int, around: int) -> tuple[int, int]:
     groups = np.split(places, np.flatnonzero(np.diff(places) > 2 * around) + 1)
     group = next(group for group in groups if group[0] <= top <= group[-1])
     return int(group[0]), int(group[-1])
-
-
-def _spread(risen: FloatArray) -> float:
-    """Return the standard deviation of most samples."""
-    return 1.4826 * float(np.median(np.abs(risen - np.median(risen))))
 
 
 def _reach(risen: FloatArray, noise: float) -> tuple[int, int]:

@@ -149,9 +149,23 @@ class Identified:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader must know of the modes, in sentences."""
-        moved = (_moved_note(mode) for mode in self.modes if mode.spread > 0.0)
-        clipped = (_clipped_note(int(channel)) for channel in np.flatnonzero(self.clipped))
-        return (*clipped, *moved, *(_undamped_note(pole) for pole in self.undamped))
+        clipped = [
+            f"row {int(channel) + 1} of the decays is clipped: its modes, dampings and levels are not those "
+            "of the object; leave it out, and strike softer or set a wider range"
+            for channel in np.flatnonzero(self.clipped)
+        ]
+        moved = [
+            f"the structure changed between the rows: the mode at {mode.frequency:.6g} Hz lies "
+            f"{mode.spread:.2g} Hz (one standard deviation) elsewhere from row to row"
+            for mode in self.modes
+            if mode.spread > 0.0
+        ]
+        undamped = [
+            f"{pole.frequency:.6g} Hz does not decay (damping {pole.damping:.2g} 1/s, one standard deviation "
+            f"{pole.damping_sigma:.2g}): driven from outside, or sharper than the lines tell; it is no mode"
+            for pole in self.undamped
+        ]
+        return (*clipped, *moved, *undamped)
 
 
 def modes_of_decay(decays: AnyArray, rate: float, search: PoleSearch | None = None) -> Identified:
@@ -276,7 +290,11 @@ def _searched(lines: SpectralLines, search: PoleSearch, rounding: float) -> Iden
     most = min(search.most, len(lines.frequencies) // _LINES_A_MODE)
     moved, full = merge_poles(lines, fit, search), False
     while not full:
-        new = [one for one in new_poles(lines, fit, search, rounding) if not _stands_for(moved, one[0])]
+        new = [
+            one
+            for one in new_poles(lines, fit, search, rounding)
+            if not any(mode.contains(one[0]) for mode in moved)
+        ]
         room = most - len(fit.omegas)
         full = len(new) > room
         if len(new) == 0 or room == 0:
@@ -313,10 +331,6 @@ class MovedMode:
     def contains(self, omega: float) -> bool:
         """Return whether a pole at ``omega`` rad/s belongs to this mode."""
         return self.reach[0] <= omega <= self.reach[1]
-
-
-def _stands_for(moved: Sequence[MovedMode], omega: float) -> bool:
-    return any(mode.contains(omega) for mode in moved)
 
 
 def _described(lines: SpectralLines, fit: PoleFit, moved: Sequence[MovedMode], full: bool) -> Identified:
@@ -373,27 +387,6 @@ def _moved_pole(fit: PoleFit, mode: MovedMode) -> IdentifiedMode:
         level=float(np.sum(np.abs(lines) ** 2)),
         lines=read_only(lines),
         spread=mode.spread / (2.0 * np.pi),
-    )
-
-
-def _clipped_note(channel: int) -> str:
-    return (
-        f"row {channel + 1} of the decays is clipped: its modes, dampings and levels are not those of the "
-        "object; leave it out, and strike softer or set a wider range"
-    )
-
-
-def _moved_note(mode: IdentifiedMode) -> str:
-    return (
-        f"the structure changed between the rows: the mode at {mode.frequency:.6g} Hz lies "
-        f"{mode.spread:.2g} Hz (one standard deviation) elsewhere from row to row"
-    )
-
-
-def _undamped_note(pole: IdentifiedMode) -> str:
-    return (
-        f"{pole.frequency:.6g} Hz does not decay (damping {pole.damping:.2g} 1/s, one standard deviation "
-        f"{pole.damping_sigma:.2g}): driven from outside, or sharper than the lines tell; it is no mode"
     )
 
 
@@ -457,7 +450,12 @@ def _merge_rows(
     if len(rows) < 2:
         return None
     values, shared, powers = values[rows], shared[rows], powers[rows]
-    alone = _fit_rows(lines, inside, values, width)
+    fits = [_fit_one_pole(lines, inside, row[None], width) for row in values]
+    alone = _RowPoles(
+        np.array([float(fit.omegas[0]) for fit in fits]),
+        np.array([float(fit.decays[0]) for fit in fits]),
+        np.array([fit.residual[0] for fit in fits]),
+    )
     left = float(np.sum(np.abs(alone.residual) ** 2))
     unexplained = float(np.sum(np.abs(shared) ** 2))
     allowed = search.misfit * powers.sum() + _NOISE * unexplained
@@ -477,15 +475,6 @@ def _fit_one_pole(lines: SpectralLines, inside: BoolArray, values: ComplexArray,
     frequencies = lines.frequencies[inside]
     top = 2.0 * np.pi * float(frequencies[int(np.argmax(np.sum(np.abs(values) ** 2, axis=0)))])
     return fit_poles(SpectralLines(frequencies, values, lines.rate), np.array([top]), np.array([width]), 1)
-
-
-def _fit_rows(lines: SpectralLines, inside: BoolArray, values: ComplexArray, width: float) -> _RowPoles:
-    fits = [_fit_one_pole(lines, inside, row[None], width) for row in values]
-    return _RowPoles(
-        np.array([float(fit.omegas[0]) for fit in fits]),
-        np.array([float(fit.decays[0]) for fit in fits]),
-        np.array([fit.residual[0] for fit in fits]),
-    )
 
 
 def _has_second_mode(

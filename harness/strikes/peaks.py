@@ -143,13 +143,10 @@ def _stands_out(
     broad = int((high - low) * step > settings.broad)
     # Several of its own widths where it is broad, or the floor would be its flanks.
     reach = max(settings.floor_reach / step, broad * _WIDTHS * (high - low))
-    above = level[top] - _floor(level, top, round(reach))
+    bins = round(reach)
+    floor = float(np.median(level[max(0, top - bins) : top + bins + 1]))
+    above = level[top] - floor
     return prominence >= settings.prominence[broad] and above > settings.above_floor[broad]
-
-
-def _floor(level: FloatArray, top: int, bins: int) -> float:
-    """dB: the median about a peak."""
-    return float(np.median(level[max(0, top - bins) : top + bins + 1]))
 
 
 def _reach(power: FloatArray, top: int, edge: float) -> tuple[int, int, int]:
@@ -174,7 +171,11 @@ def _peak(
     transfer = spectra.transfer[heard, band]
     _, strengths, waves = np.linalg.svd(whitening[:, None] * transfer, full_matrices=False)
     frequency, damping = _resonance(spectra.frequencies[band], waves[0], settings.decay)
-    y, unit = _residues(spectra.frequencies[band], transfer, frequency, damping + settings.decay)
+    pole = frequency + 1j * max((damping + settings.decay), _LEAST_DECAY) / (2.0 * np.pi)
+    wave = 1.0 / (spectra.frequencies[band] - pole)
+    wave /= np.linalg.norm(wave)
+    inverse = np.linalg.pinv(np.column_stack([wave, np.ones(len(wave))]))[0]
+    y, unit = np.asarray(transfer @ inverse), float(np.linalg.norm(inverse))
     length = np.linalg.norm(y)
     everyone = np.nonzero(used)[0][heard]
     return Peak(
@@ -207,21 +208,6 @@ def _resonance(frequencies: FloatArray, wave: ComplexArray, decay: float) -> tup
     if not frequencies[0] <= frequency <= frequencies[-1]:
         frequency = float(frequencies[int(np.argmax(np.abs(wave)))])
     return frequency, float(2.0 * np.pi * pole.imag - decay)
-
-
-def _residues(
-    frequencies: FloatArray, transfer: ComplexArray, frequency: float, decay: float
-) -> tuple[ComplexArray, float]:
-    """``(K,)``: each strike's ``r`` in ``r / (f - z) + b``, and its deviation for lines of deviation 1.
-
-    What the neighbours' skirts add to a strike, ``b``, differs from strike to strike, and is not the
-    peak's; on a broad peak it is as large as the peak (Ewins, Modal Testing, 2000, section 4.4).
-    """
-    pole = frequency + 1j * max(decay, _LEAST_DECAY) / (2.0 * np.pi)
-    wave = 1.0 / (frequencies - pole)
-    wave /= np.linalg.norm(wave)
-    inverse = np.linalg.pinv(np.column_stack([wave, np.ones(len(wave))]))[0]
-    return np.asarray(transfer @ inverse), float(np.linalg.norm(inverse))
 
 
 def _sorted_out(peaks: list[Peak], settings: Analysis) -> tuple[tuple[Peak, ...], tuple[Peak, ...]]:

@@ -84,7 +84,12 @@ class Spectra:
     noise: FloatArray
 
 
-def _common_rate(strikes: Sequence[Strike]) -> float:
+def spectra_of(strikes: Sequence[Strike], settings: Analysis) -> Spectra:
+    """The spectra of strikes that count.
+
+    Raises:
+        DataRefused: their rates differ.
+    """
     rates = np.array([strike.rate for strike in strikes])
     rate = float(np.median(rates))
     if np.max(np.abs(rates / rate - 1.0)) > _RATE_TOLERANCE:
@@ -92,16 +97,6 @@ def _common_rate(strikes: Sequence[Strike]) -> float:
             f"the strikes were sampled at {rates.min():g} to {rates.max():g} Hz; "
             "strikes of one run must share one rate, to one part in a thousand"
         )
-    return rate
-
-
-def spectra_of(strikes: Sequence[Strike], settings: Analysis) -> Spectra:
-    """The spectra of strikes that count.
-
-    Raises:
-        DataRefused: their rates differ.
-    """
-    rate = _common_rate(strikes)
     samples = round(settings.duration * rate)
     size = int(next_fast_len(2 * samples, real=True))
     frequencies = rfftfreq(size, 1.0 / rate)
@@ -112,7 +107,10 @@ def spectra_of(strikes: Sequence[Strike], settings: Analysis) -> Spectra:
         pulse = round((settings.before + settings.pulse) * rate)
         force.append(rfft(_windowed(strike.force, start, window, pulse), size))
         pressure.append(rfft(_windowed(strike.pressure, start, window, samples), size))
-        noise.append(_noise_density(strike.pressure[:start], window))
+        before = strike.pressure[:start]
+        noise.append(
+            0.0 if len(before) < _LEAST_NOISE_SAMPLES else float(before.std() * np.sqrt(np.sum(window**2)))
+        )
     forces = np.array(force)
     strength = np.abs(forces)
     excited = strength >= settings.force_floor * strength.max(axis=1, keepdims=True)
@@ -126,10 +124,3 @@ def _windowed(signal: FloatArray, start: int, window: FloatArray, length: int) -
     rest = signal[:start].mean() if start >= _LEAST_NOISE_SAMPLES else 0.0
     piece = signal[start : start + min(length, len(window))] - rest
     return np.asarray(piece * window[: len(piece)])
-
-
-def _noise_density(before: FloatArray, window: FloatArray) -> float:
-    """Expected magnitude of a spectral line of what was heard before the strike, as if white."""
-    if len(before) < _LEAST_NOISE_SAMPLES:
-        return 0.0
-    return float(before.std() * np.sqrt(np.sum(window**2)))

@@ -63,9 +63,24 @@ def add_arm(spec: Any, model: str) -> Any:
     add_hull(spec, body, "base", hulls["base"], ARM_COLOUR)
     for joint, link in enumerate(LINKS[1:], start=1):
         placement = link_from_previous(table, joint)
-        body = body.add_body(name=link, pos=placement[:3, 3], quat=_quaternion(placement[:3, :3]))
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, placement[:3, :3].ravel())
+        body = body.add_body(name=link, pos=placement[:3, 3], quat=quaternion)
         body.add_joint(name=f"joint_{joint}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
-        _set_inertia(body, table, joint)
+        sine, cosine = TWIST_SINES[joint - 1], TWIST_COSINES[joint - 1]
+        turn = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+        tensor = turn @ table.inertias[joint - 1] @ turn.T
+        body.explicitinertial = True
+        body.mass = table.masses[joint - 1]
+        body.ipos = turn @ table.centres[joint - 1] + np.array([table.a[joint - 1], 0.0, 0.0])
+        body.fullinertia = [
+            tensor[0, 0],
+            tensor[1, 1],
+            tensor[2, 2],
+            tensor[0, 1],
+            tensor[0, 2],
+            tensor[1, 2],
+        ]
         add_hull(spec, body, link, hulls[link], ARM_COLOUR if joint < 4 else JOINT_COLOUR)
     # MuJoCo leaves out parent and child, but not where the parent stands still.
     spec.add_exclude(bodyname1="base", bodyname2="shoulder")
@@ -107,23 +122,6 @@ def add_hull(spec: Any, body: Any, name: str, vertices: FloatArray, colour: tupl
     """Give a body of a model the convex hull of ``(n, 3)`` points, in metres of its frame, as its shape."""
     spec.add_mesh(name=name, uservert=vertices.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
     body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, mass=0.0, rgba=colour)
-
-
-def _set_inertia(body: Any, table: ArmTable, joint: int) -> None:
-    """The tables give each link in its Denavit-Hartenberg frame: the length and the twist further on."""
-    sine, cosine = TWIST_SINES[joint - 1], TWIST_COSINES[joint - 1]
-    turn = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
-    tensor = turn @ table.inertias[joint - 1] @ turn.T
-    body.explicitinertial = True
-    body.mass = table.masses[joint - 1]
-    body.ipos = turn @ table.centres[joint - 1] + np.array([table.a[joint - 1], 0.0, 0.0])
-    body.fullinertia = [tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]]
-
-
-def _quaternion(rotation: FloatArray) -> FloatArray:
-    quaternion = np.empty(4)
-    mujoco.mju_mat2Quat(quaternion, rotation.ravel())
-    return quaternion
 
 
 def striker(flange_from_hammer: FloatArray) -> Part:

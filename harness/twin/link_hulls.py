@@ -50,34 +50,26 @@ def placed(model: str, folder: Path) -> dict[str, FloatArray]:
     """
     hulls = {}
     for link, name, offset in zip(LINKS, _FILES, _OFFSETS[model], strict=True):
-        link_from_file = transform(_turn(link), np.array([0.0, 0.0, offset]))
-        hulls[link] = apply(link_from_file, _stl_vertices(folder / f"{name}.stl"))
+        about_x = rotation_from_vector(np.array([np.pi / 2, 0.0, 0.0]))
+        turns = {
+            "base": rotation_from_vector(np.array([0.0, 0.0, np.pi])),
+            "shoulder": rotation_from_vector(np.array([0.0, 0.0, np.pi])),
+            "upper_arm": rotation_from_vector(np.array([0.0, 0.0, -np.pi / 2])) @ about_x,
+            "forearm": rotation_from_vector(np.array([0.0, 0.0, -np.pi / 2])) @ about_x,
+            "wrist_1": about_x,
+            "wrist_2": np.eye(3),
+            "wrist_3": about_x,
+        }
+        link_from_file = transform(turns[link], np.array([0.0, 0.0, offset]))
+        path = folder / f"{name}.stl"
+        raw = path.read_bytes()
+        count = int.from_bytes(raw[80:84], "little")
+        if len(raw) != 84 + 50 * count:
+            raise DataRefused(f"{path.name}: {len(raw)} bytes are not a binary STL of {count} triangles")
+        triangles = np.frombuffer(raw, np.uint8, offset=84).reshape(count, 50)
+        corners = triangles[:, 12:48].copy().view("<f4").reshape(-1, 3)
+        hulls[link] = apply(link_from_file, np.unique(corners, axis=0).astype(np.float64))
     return hulls
-
-
-def _turn(link: str) -> FloatArray:
-    about_x = rotation_from_vector(np.array([np.pi / 2, 0.0, 0.0]))
-    turns = {
-        "base": rotation_from_vector(np.array([0.0, 0.0, np.pi])),
-        "shoulder": rotation_from_vector(np.array([0.0, 0.0, np.pi])),
-        "upper_arm": rotation_from_vector(np.array([0.0, 0.0, -np.pi / 2])) @ about_x,
-        "forearm": rotation_from_vector(np.array([0.0, 0.0, -np.pi / 2])) @ about_x,
-        "wrist_1": about_x,
-        "wrist_2": np.eye(3),
-        "wrist_3": about_x,
-    }
-    return turns[link]
-
-
-def _stl_vertices(path: Path) -> FloatArray:
-    """``(n, 3)`` distinct corners of a binary STL file."""
-    raw = path.read_bytes()
-    count = int.from_bytes(raw[80:84], "little")
-    if len(raw) != 84 + 50 * count:
-        raise DataRefused(f"{path.name}: {len(raw)} bytes are not a binary STL of {count} triangles")
-    triangles = np.frombuffer(raw, np.uint8, offset=84).reshape(count, 50)
-    corners = triangles[:, 12:48].copy().view("<f4").reshape(-1, 3)
-    return np.unique(corners, axis=0).astype(np.float64)
 
 
 def _pack(folder: Path) -> None:

@@ -182,16 +182,16 @@ def plan_contact(
         for approach in candidates[: searched if thorough else None]:
             travel = connect(around, seed_joints, approach.stand_off_joints, seed, thorough)
             if travel is not None:
-                return _planned(bench, approach, seed_joints, travel, stand_off)
+                pressed = approach.base_from_gel @ bench.gel_from_flange
+                before = (
+                    approach.base_from_gel
+                    @ translation(np.array([0.0, 0.0, -stand_off]))
+                    @ bench.gel_from_flange
+                )
+                return PlannedContact(
+                    seed_joints, travel, before, pressed, approach.pressed_joints, stand_off
+                )
     return None
-
-
-def _planned(
-    bench: TwinBench, approach: Approach, start: FloatArray, travel: FloatArray, stand_off: float
-) -> PlannedContact:
-    pressed = approach.base_from_gel @ bench.gel_from_flange
-    before = approach.base_from_gel @ translation(np.array([0.0, 0.0, -stand_off])) @ bench.gel_from_flange
-    return PlannedContact(start, travel, before, pressed, approach.pressed_joints, stand_off)
 
 
 def _approaches(

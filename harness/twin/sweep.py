@@ -35,7 +35,12 @@ def sweep(bench: TwinBench, start: FloatArray, end: FloatArray) -> Blocked | Non
     Each step is as long as the narrowest gap allows whatever the direction of motion
     (conservative advancement), so that nothing thinner is jumped over.
     """
-    relative = _relative_motion(bench, np.abs(end - start))
+    travelled = np.concatenate(
+        [np.zeros((1, len(bench.parts))), np.cumsum(bench.reach * np.abs(end - start)[:, None], axis=0)]
+    )
+    links: IntArray = bench.links
+    relative: FloatArray = travelled[links[None, :], np.arange(len(links))[None, :]] - travelled[links, :]
+    relative = np.maximum(relative, 0.0)
     greatest = float(relative.max())
     floor = STEP / greatest if greatest > STEP else 1.0
     share = 0.0
@@ -88,16 +93,3 @@ def line_postures(bench: TwinBench, start: FloatArray, poses: FloatArray) -> Flo
             break
         postures.append(joints)
     return np.stack(postures)
-
-
-def _relative_motion(bench: TwinBench, angles: FloatArray) -> FloatArray:
-    """``(parts, parts)`` m: how far two bodies can move against each other while joints turn by ``angles``.
-
-    Only for pairs whose first is nearer the root; joints that carry both do not count.
-    """
-    travelled = np.concatenate(
-        [np.zeros((1, len(bench.parts))), np.cumsum(bench.reach * angles[:, None], axis=0)]
-    )
-    links: IntArray = bench.links
-    relative: FloatArray = travelled[links[None, :], np.arange(len(links))[None, :]] - travelled[links, :]
-    return np.maximum(relative, 0.0)

@@ -100,7 +100,17 @@ def _made(
 ) -> tuple[ModelProto, dict[str, str | float | int | bool | None]]:
     spec = profile.network
     if isinstance(spec, PerceptronSpec):
-        return _perceptrons(modes, split, spec, seed, folder, report, threads)
+        import torch
+
+        from harness.authoring.audio.mlp import AudioTraining
+
+        torch.set_num_threads(threads)
+        training = AudioTraining(spec, modes, split.trained, seed)
+        train(training, spec.epochs, folder / CHECKPOINT, report)
+        trained = training.finish()
+        graph = audio_graph(trained.branches, trained.normaliser, trained.scales, trained.encoding)
+        settings: dict[str, str | float | int | bool | None] = {"network": "perceptrons", **vars(spec)}
+        return graph, settings | {"last_loss": training.losses[-1]}
     report("fitting waves", 0.0)
     nodes = SoundSamples(modes.points[split.trained], modes.shapes[split.trained])
     number = wave_number(modes)
@@ -116,23 +126,6 @@ def _made(
     }
 
 
-def _perceptrons(
-    modes: Modes, split: Split, spec: PerceptronSpec, seed: int, folder: Path, report: Report, threads: int
-) -> tuple[ModelProto, dict[str, str | float | int | bool | None]]:
-    # Heavy, and only here: waves are made without it.
-    import torch
-
-    from harness.authoring.audio.mlp import AudioTraining
-
-    torch.set_num_threads(threads)
-    training = AudioTraining(spec, modes, split.trained, seed)
-    train(training, spec.epochs, folder / CHECKPOINT, report)
-    trained = training.finish()
-    graph = audio_graph(trained.branches, trained.normaliser, trained.scales, trained.encoding)
-    settings: dict[str, str | float | int | bool | None] = {"network": "perceptrons", **vars(spec)}
-    return graph, settings | {"last_loss": training.losses[-1]}
-
-
 def measure_audio(
     modes: Modes, dampings: FloatArray, split: Split, graph: ModelProto, sounds: int
 ) -> dict[str, dict[str, float]]:
@@ -145,8 +138,13 @@ def measure_audio(
     network = opened(graph, len(modes.frequencies))
     table, scales = scaled(truth)
     # What is linear between nodes of a table is not measured here: its nodes are all nodes.
+    points = modes.points[split.held_out]
+    parts = [
+        network({"points": points[first : first + _CHUNK]})["gains"]
+        for first in range(0, len(points), _CHUNK)
+    ]
     found = {
-        "network": _in_chunks(network, modes.points[split.held_out]),
+        "network": np.concatenate(parts).astype(np.float64),
         "nearest_trained": nearest_trained(modes, split),
         "linear": interpolated(modes, split),
         "table_float16": table.astype(np.float64) * scales[:, None],
@@ -169,14 +167,6 @@ def opened(graph: ModelProto, modes: int) -> Network:
     """A graph that can be asked, before it is part of an ObjectFile."""
     points, gains = network_tensors(modes, _ANYWHERE)
     return Network(graph.SerializeToString(), NETWORK, [points], [gains])
-
-
-def _in_chunks(network: Network, points: FloatArray) -> FloatArray:
-    parts = [
-        network({"points": points[first : first + _CHUNK]})["gains"]
-        for first in range(0, len(points), _CHUNK)
-    ]
-    return np.concatenate(parts).astype(np.float64)
 
 
 def _sound_errors(

@@ -82,7 +82,12 @@ class AudioTraining:
     """
 
     def __init__(self, spec: PerceptronSpec, modes: Modes, trained: IntArray, seed: int) -> None:
-        _check(spec)
+        if spec.branches not in (1, 3):
+            raise WrongUse(f"{spec.branches} branches; there are three, for x, y and z, or one for all")
+        if min(spec.depth, spec.width, spec.epochs, spec.batch) < 1 or not 0 <= spec.skip < max(
+            spec.depth, 1
+        ):
+            raise WrongUse(f"no network is {spec}; sizes are 1 or more, and skip is a hidden layer or 0")
         self._spec, self._modes, self._trained, self._seed = spec, modes, trained, seed
         self.epoch = 0
         self.losses: list[float] = []
@@ -193,10 +198,3 @@ class AudioTraining:
                 )
         hidden = np.concatenate(found)
         return np.concatenate([hidden, np.ones((len(hidden), 1), np.float32)], axis=1)
-
-
-def _check(spec: PerceptronSpec) -> None:
-    if spec.branches not in (1, 3):
-        raise WrongUse(f"{spec.branches} branches; there are three, for x, y and z, or one for all")
-    if min(spec.depth, spec.width, spec.epochs, spec.batch) < 1 or not 0 <= spec.skip < max(spec.depth, 1):
-        raise WrongUse(f"no network is {spec}; sizes are 1 or more, and skip is a hidden layer or 0")

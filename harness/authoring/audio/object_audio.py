@@ -159,7 +159,10 @@ def _modes(
     else:
         with timed(whole, "intake"):
             taken = surface_of(wanted.mesh, wanted.units, wanted.wall, wanted.up_axis)
-        modes, kept = _solved(wanted, taken.mesh, store, begin)
+        edge = wanted.edge
+        if edge is None:
+            edge = default_edge(taken.mesh, wanted.material, wanted.limit, wanted.most)
+        modes, kept = solved_once(taken.mesh, wanted.material, wanted.limit, edge, wanted.most, store, begin)
         mesh, said = taken.mesh, (*taken.said, *((_KEPT,) if kept else ()))
     none = dict.fromkeys([before + stage for before in ("", CPU) for stage in _SOLVED.values()], 0.0)
     seconds |= whole | none | renamed(modes.seconds, _SOLVED)
@@ -180,13 +183,6 @@ def _of_volume(wanted: AudioRequest, begin: Begin) -> tuple[Mesh, Modes, tuple[s
     )
     modes = solved.solution.modes
     return Mesh(modes.points, modes.faces), modes, solved.said
-
-
-def _solved(wanted: AudioRequest, mesh: Mesh, store: Store | None, begin: Begin) -> tuple[Modes, bool]:
-    edge = wanted.edge
-    if edge is None:
-        edge = default_edge(mesh, wanted.material, wanted.limit, wanted.most)
-    return solved_once(mesh, wanted.material, wanted.limit, edge, wanted.most, store, begin)
 
 
 def _lowest(modes: Modes, most: int) -> Modes:

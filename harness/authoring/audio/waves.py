@@ -131,7 +131,11 @@ def fit_waves(
     shift, factor = 0.5 * (low + high), 2.0 / float(np.linalg.norm(high - low))
     found = []
     for reach in reaches:
-        vectors, phases = _waves(width, reach * number / factor, seed)
+        random = np.random.default_rng([seed, 3])
+        ways = random.standard_normal((3, width))
+        lengths = _BALL * (reach * number / factor) * random.uniform(size=width) ** (1.0 / 3.0)
+        vectors = ways * (lengths / np.linalg.norm(ways, axis=0))
+        vectors, phases = _single(vectors), _single(random.uniform(0.0, 2.0 * np.pi, width))
         empty = Waves(shift, factor, vectors, phases, np.zeros((width + 4, 0)))
         shares = error_shares(targets)
         readout = solve_readout(empty.features, samples.points, targets, measured, shares, storage)
@@ -162,15 +166,6 @@ def fit_enough_waves(
         wider = fit_waves(samples, measured, number, width, seed, reaches, spec.storage)
         best = min(best, wider, key=lambda one: one.readout.expected)
     return best
-
-
-def _waves(width: int, spread: float, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Vectors and phases that single precision holds exactly, so that the graph has the same waves."""
-    random = np.random.default_rng([seed, 3])
-    ways = random.standard_normal((3, width))
-    lengths = _BALL * spread * random.uniform(size=width) ** (1.0 / 3.0)
-    vectors = ways * (lengths / np.linalg.norm(ways, axis=0))
-    return _single(vectors), _single(random.uniform(0.0, 2.0 * np.pi, width))
 
 
 def _single(array: AnyArray) -> FloatArray:

@@ -70,14 +70,14 @@ def build_plan(
         record = read_record(of, item.row.name)
         if stands(of, record, item.key):
             standing.add(item.row.name)
-        elif record is not None and not retry and _failed_for_good(record, item.key):
+        elif (
+            record is not None
+            and not retry
+            and (not record.built and record.key == item.key and record.outcome not in PASSING)
+        ):
             known[item.row.name] = record
     waiting = tuple(item for item in items if item.row.name not in standing and item.row.name not in known)
     return BuildPlan(items, frozenset(standing), known, waiting)
-
-
-def _failed_for_good(record: ObjectRecord, key: str) -> bool:
-    return not record.built and record.key == key and record.outcome not in PASSING
 
 
 class Runner(Protocol):

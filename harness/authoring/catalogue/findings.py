@@ -115,7 +115,17 @@ def intake_finding(row: CatalogueRow, mesh: str, sound: bool = True) -> IntakeFi
         # Touch and look do without an inside.
         open_only = isinstance(refused, MeshRefused) and found.units is not None and not sound
         return found if open_only else replace(found, reason=str(refused))
-    return _with_inside(found, row, surface)
+    assert found.longest_side is not None
+    wall = thin_wall(surface)
+    mass = enclosed_volume(surface) * MATERIALS[row.material].density
+    thin = []
+    if wall < THIN * found.longest_side:
+        thin.append(
+            f"a wall of {wall * 1e3:.3g} mm is 1/{found.longest_side / wall:.0f} of the longest side, "
+            f"thinner than 1/{1.0 / THIN:.0f}: filling may take hours"
+        )
+    remarks = (*found.remarks, *thin, *_of_mass(row, mass, found.longest_side))
+    return replace(found, wall=wall, mass=mass, remarks=remarks)
 
 
 def _taken(row: CatalogueRow, mesh: str) -> tuple[Mesh, str, bool, tuple[str, ...]]:
@@ -128,15 +138,6 @@ def _taken(row: CatalogueRow, mesh: str) -> tuple[Mesh, str, bool, tuple[str, ..
     return walled(intake.mesh, row.wall), report.units, report.watertight, report.warnings
 
 
-def _with_inside(found: IntakeFinding, row: CatalogueRow, surface: Mesh) -> IntakeFinding:
-    """With what only a closed surface has: walls and a mass."""
-    assert found.longest_side is not None
-    wall = thin_wall(surface)
-    mass = enclosed_volume(surface) * MATERIALS[row.material].density
-    remarks = (*found.remarks, *_of_wall(wall, found.longest_side), *_of_mass(row, mass, found.longest_side))
-    return replace(found, wall=wall, mass=mass, remarks=remarks)
-
-
 def _of_label(row: CatalogueRow, sides: FloatArray) -> list[str]:
     label, longest = row.scale, float(sides.max())
     if label is None or abs(longest / label - 1.0) <= LABEL:
@@ -145,15 +146,6 @@ def _of_label(row: CatalogueRow, sides: FloatArray) -> list[str]:
     alike = np.flatnonzero(np.abs(sides / label - 1.0) <= LABEL)
     which = f"; it is the side along {'xyz'[alike[0]]}" if len(alike) else ""
     return [f"the scale label {difference}{which}: the mesh's own size is used"]
-
-
-def _of_wall(wall: float, longest: float) -> list[str]:
-    if wall >= THIN * longest:
-        return []
-    return [
-        f"a wall of {wall * 1e3:.3g} mm is 1/{longest / wall:.0f} of the longest side, thinner than "
-        f"1/{1.0 / THIN:.0f}: filling may take hours"
-    ]
 
 
 def _of_mass(row: CatalogueRow, mass: float, longest: float) -> list[str]:

@@ -136,7 +136,13 @@ def read_catalogue(path: Path) -> Catalogue:
             excluded.append(ExcludedRow(" ".join(name.splitlines()), f"{where}: {refused}"))
     if not rows and not excluded:
         raise WrongUse(f"{path} lists no object; write a row of {', '.join(PUBLISHED)} for each")
-    unique, again = _unique(rows)
+    count = Counter(row.name.lower() for row in rows)
+    unique = tuple(row for row in rows if count[row.name.lower()] == 1)
+    again = tuple(
+        ExcludedRow(row.name, f"{count[row.name.lower()]} rows have the name {row.name}; give each its own")
+        for row in rows
+        if count[row.name.lower()] > 1
+    )
     return Catalogue(path, unique, (*excluded, *again), (*notes, *_notes(unique)))
 
 
@@ -203,18 +209,6 @@ def _positive(given: dict[str, str], column: str, unit: str) -> float | None:
             f"{column} {given[column]!r} is no number of {unit} above zero; correct it or leave it out"
         )
     return value
-
-
-def _unique(rows: Sequence[CatalogueRow]) -> tuple[tuple[CatalogueRow, ...], tuple[ExcludedRow, ...]]:
-    # Two names that differ by case are one folder on some file systems.
-    count = Counter(row.name.lower() for row in rows)
-    unique = tuple(row for row in rows if count[row.name.lower()] == 1)
-    again = tuple(
-        ExcludedRow(row.name, f"{count[row.name.lower()]} rows have the name {row.name}; give each its own")
-        for row in rows
-        if count[row.name.lower()] > 1
-    )
-    return unique, again
 
 
 def _notes(rows: Sequence[CatalogueRow]) -> tuple[str, ...]:

@@ -53,7 +53,11 @@ def build_object(item: BuildItem, spec: BuildSpec, of: BuildFolder, report: Repo
     """
     begun = time.perf_counter()
     try:
-        _check_key(item, spec)
+        if build_item(item.row, item.mesh, spec).key != item.key:
+            raise DataRefused(
+                f"{item.mesh} or the program on {socket.gethostname()} is not the one that the build was "
+                "planned with; install one version everywhere, leave meshes alone meanwhile, and build again"
+            )
         stages = [sense_stage(sense, item, spec, of, report) for sense in item.stages]
         description = _composed(item, stages)
         _place(description, stages, of, item.row.name)
@@ -74,19 +78,6 @@ def build_object(item: BuildItem, spec: BuildSpec, of: BuildFolder, report: Repo
         ),
         of,
     )
-
-
-def _check_key(item: BuildItem, spec: BuildSpec) -> None:
-    """Refuse to build something else than was planned.
-
-    Raises:
-        DataRefused: the mesh was changed since, or this machine has another program or another file.
-    """
-    if build_item(item.row, item.mesh, spec).key != item.key:
-        raise DataRefused(
-            f"{item.mesh} or the program on {socket.gethostname()} is not the one that the build was planned "
-            "with; install one version everywhere, leave meshes alone meanwhile, and build again"
-        )
 
 
 def failure(item: BuildItem, outcome: Outcome, reason: str, seconds: float) -> ObjectRecord:
@@ -168,24 +159,25 @@ def _place(description: Description, stages: Sequence[SenseStage], of: BuildFold
             source = next(
                 each.object.folder / entry.file for each in stages if entry in each.object.description.files
             )
-            link_or_copy(source, aside / entry.file)
+            target = aside / entry.file
+            try:
+                os.link(source, target)
+            except OSError:
+                shutil.copyfile(source, target)
         write_described(aside, description, {})
         aside.chmod(0o755)
-        _exchange(aside, of.object(name))
+        folder = of.object(name)
+        if folder.is_dir():
+            # Killed between the two renames, the object is missing, and composed again from its stages.
+            old = aside.with_name(f"{aside.name}.old")
+            folder.rename(old)
+            aside.rename(folder)
+            shutil.rmtree(old, ignore_errors=True)
+        else:
+            aside.rename(folder)
+        sync_folder(folder.parent)
     finally:
         shutil.rmtree(aside, ignore_errors=True)
-
-
-def _exchange(aside: Path, folder: Path) -> None:
-    if folder.is_dir():
-        # Killed between the two renames, the object is missing, and composed again from its stages.
-        old = aside.with_name(f"{aside.name}.old")
-        folder.rename(old)
-        aside.rename(folder)
-        shutil.rmtree(old, ignore_errors=True)
-    else:
-        aside.rename(folder)
-    sync_folder(folder.parent)
 
 
 def sense_stage(
@@ -269,9 +261,11 @@ def _workspace(of: BuildFolder, name: str) -> Iterator[Path]:
             release_lock(lock, held)
 
 
-def _request(item: BuildItem, spec: BuildSpec) -> PartRequest:
+def _build(
+    sense: Modality, item: BuildItem, spec: BuildSpec, store: Store, out: Path, report: Report
+) -> BuiltAudio | BuiltTouch | BuiltVision:
     row = item.row
-    return PartRequest(
+    wanted = PartRequest(
         mesh=item.mesh,
         material=MATERIALS[row.material],
         profile=spec.profile,
@@ -281,12 +275,6 @@ def _request(item: BuildItem, spec: BuildSpec) -> PartRequest:
         seed=spec.seed,
         up_axis=row.up_axis,
     )
-
-
-def _build(
-    sense: Modality, item: BuildItem, spec: BuildSpec, store: Store, out: Path, report: Report
-) -> BuiltAudio | BuiltTouch | BuiltVision:
-    wanted = _request(item, spec)
     if sense == "audio":
         own = AudioRequest(**vars(wanted), limit=spec.limit, most=spec.most, edge=spec.edge)
         return build_audio(own, out, store, report, threads=1)
@@ -319,11 +307,3 @@ def _strip(tree: Any, where: str, clock: dict[str, float]) -> None:
             clock[f"{where}{name}"] = tree.pop(name)
         else:
             _strip(tree[name], f"{where}{name}.", clock)
-
-
-def link_or_copy(source: Path, target: Path) -> None:
-    """One file under two names where the file system can, else a copy."""
-    try:
-        os.link(source, target)
-    except OSError:
-        shutil.copyfile(source, target)

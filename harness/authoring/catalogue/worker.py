@@ -169,14 +169,10 @@ def _serve(pipe: Connection, memory: int | None, parent: int) -> None:
             with _logged(job.folder.log(job.item.row.name)):
                 record = _built(job)
         else:
-            record = _without_folder(job)
+            where = f"{socket.gethostname()} has no folder {job.folder.folder}"
+            reason = f"{where}; all machines must see it under one path, as by NFS"
+            record = failure(job.item, "worker lost", reason, 0.0)
         pipe.send(record)
-
-
-def _without_folder(job: Job) -> ObjectRecord:
-    where = f"{socket.gethostname()} has no folder {job.folder.folder}"
-    reason = f"{where}; all machines must see it under one path, as by NFS"
-    return failure(job.item, "worker lost", reason, 0.0)
 
 
 def _built(job: Job) -> ObjectRecord:

@@ -65,15 +65,13 @@ class MapErrors:
     def rows(self) -> dict[str, Mapping[str, float]]:
         """Median and 10th percentile of each, by name."""
         every = {"level": self.level, "nearest_trained": self.nearest, "background": self.nothing}
-        return {name: summary(values) for name, values in every.items()}
-
-
-def summary(decibels: FloatArray) -> dict[str, float]:
-    """Median and 10th percentile."""
-    return {
-        "psnr_db_median": float(np.median(decibels)),
-        "psnr_db_p10": float(np.quantile(decibels, 0.1)),
-    }
+        return {
+            name: {
+                "psnr_db_median": float(np.median(values)),
+                "psnr_db_p10": float(np.quantile(values, 0.1)),
+            }
+            for name, values in every.items()
+        }
 
 
 @dataclass(frozen=True, eq=False)

@@ -251,7 +251,9 @@ def code_surface(
         WrongUse: no node is to be seen.
     """
     viewer = _Viewer(raster, sensor, spec)
-    seen = visible(raster, nodes)
+    probe = TactileSensor("probe", 1, 1, 1e-6, 1.0)
+    gap = height_maps(raster, inverse(nodes.object_from_node), probe)[:, 0, 0]
+    seen: BoolArray = np.abs(gap) < _VISIBLE
     nodes = nodes[seen]
     if len(nodes) == 0:
         raise WrongUse("no place of the surface can be touched from outside; is the mesh inside out?")
@@ -277,14 +279,6 @@ def patch_bytes(sensor: TactileSensor, spec: PatchSpec) -> float:
     pixels = np.pi * (_radius(sensor, spec) / spec.pitch) ** 2
     heights = pixels if spec.width is None else spec.width * (1.0 + pixels / spec.learned)
     return float(2.0 * heights + pixels)
-
-
-def visible(raster: RasterMesh, nodes: SurfaceNodes) -> BoolArray:
-    """``(n,)``: straight from outside, nothing of the object is in front of the node."""
-    probe = TactileSensor("probe", 1, 1, 1e-6, 1.0)
-    gap = height_maps(raster, inverse(nodes.object_from_node), probe)[:, 0, 0]
-    seen: BoolArray = np.abs(gap) < _VISIBLE
-    return seen
 
 
 def principal(rows: FloatArray, width: int) -> tuple[FloatArray, float]:
@@ -337,7 +331,21 @@ class _Viewer:
             share = blocks.mean(axis=(2, 4))[:, self.inside]
             cover[part] = np.rint(255.0 * share)
             middle = np.s_[:, _RAYS // 2 :: _RAYS, _RAYS // 2 :: _RAYS]
-            whole = continued(np.where(in_reach[middle], gap[middle], np.nan), _CONTINUED)
+            whole = np.where(in_reach[middle], gap[middle], np.nan)
+            # Heights go on straight beyond where they end, a pixel a step.
+            for _ in range(_CONTINUED):
+                padded = np.pad(whole, ((0, 0), (2, 2), (2, 2)), constant_values=np.nan)
+                rows, columns = whole.shape[1:]
+                total, weight = np.zeros_like(whole), np.zeros_like(whole)
+                for i, j in ((-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)):
+                    near = padded[:, 2 + i : 2 + i + rows, 2 + j : 2 + j + columns]
+                    next_one = padded[:, 2 + 2 * i : 2 + 2 * i + rows, 2 + 2 * j : 2 + 2 * j + columns]
+                    straight = 2.0 * near - next_one
+                    known = ~np.isnan(straight)
+                    total += np.where(known, straight, 0.0)
+                    weight += known
+                fill = np.isnan(whole) & (weight > 0.0)
+                whole[fill] = total[fill] / weight[fill]
             flat = whole[:, self.inside]
             found[part] = np.clip(np.where(np.isnan(flat), self._limit, flat), -self._limit, self._limit)
         return found, cover
@@ -347,30 +355,6 @@ class _Viewer:
     ) -> PatchCodes:
         """Codes of what is seen."""
         return PatchCodes(codes, basis, mean, cover, self.inside, self.outside, self.pitch)
-
-
-def continued(images: FloatArray, steps: int) -> FloatArray:
-    """Heights continued straight beyond where they end, a pixel a step.
-
-    Args:
-        images: ``(n, rows, columns)``, NaN where there is none.
-        steps: pixels.
-    """
-    images = images.copy()
-    for _ in range(steps):
-        padded = np.pad(images, ((0, 0), (2, 2), (2, 2)), constant_values=np.nan)
-        rows, columns = images.shape[1:]
-        total, weight = np.zeros_like(images), np.zeros_like(images)
-        for i, j in ((-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)):
-            near = padded[:, 2 + i : 2 + i + rows, 2 + j : 2 + j + columns]
-            next_one = padded[:, 2 + 2 * i : 2 + 2 * i + rows, 2 + 2 * j : 2 + 2 * j + columns]
-            straight = 2.0 * near - next_one
-            known = ~np.isnan(straight)
-            total += np.where(known, straight, 0.0)
-            weight += known
-        fill = np.isnan(images) & (weight > 0.0)
-        images[fill] = total[fill] / weight[fill]
-    return images
 
 
 def _radius(sensor: TactileSensor, spec: PatchSpec) -> float:

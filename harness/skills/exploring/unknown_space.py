@@ -110,17 +110,6 @@ def unknown_space(stand: UnknownStand, outline: SeenOutline | None, largest: flo
         outline: of the picture; None without a look.
         largest: m, its longest side at most.
     """
-    sides = _prism(stand, largest)
-    seen = sides if outline is None else np.concatenate([sides, _cone(stand, outline)])
-    corners = _corners_between(seen)
-    if corners is None:  # it was seen where it cannot be: the look is not believed
-        corners = _corners_between(sides)
-    assert corners is not None
-    return around(corners, 0.0, margin_of(largest), float(stand.place[2]))
-
-
-def _prism(stand: UnknownStand, largest: float) -> FloatArray:
-    """``(n, 4)`` half-spaces ``normal . place + offset <= 0``: the box of any yaw, where it may be put."""
     reach = largest / np.sqrt(2.0) + PLACES * stand.errors.place
     turns = np.arange(SIDES) * 2.0 * np.pi / SIDES
     normals = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(SIDES)])
@@ -128,7 +117,13 @@ def _prism(stand: UnknownStand, largest: float) -> FloatArray:
     high = PLACES * stand.errors.support
     top = np.array([0.0, 0.0, 1.0, -(stand.place[2] + largest + high)])
     bottom = np.array([0.0, 0.0, -1.0, stand.place[2] - high])
-    return np.concatenate([around_place, top[None], bottom[None]])
+    sides = np.concatenate([around_place, top[None], bottom[None]])
+    seen = sides if outline is None else np.concatenate([sides, _cone(stand, outline)])
+    corners = _corners_between(seen)
+    if corners is None:  # it was seen where it cannot be: the look is not believed
+        corners = _corners_between(sides)
+    assert corners is not None
+    return around(corners, 0.0, margin_of(largest), float(stand.place[2]))
 
 
 def _cone(stand: UnknownStand, outline: SeenOutline) -> FloatArray:
