@@ -16,7 +16,7 @@ from harness.experiment.experiment import Experiment, Helpers
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import StepPerformer
 from harness.skills.press import PressPerformer
-from harness.twin.bench import way_between
+from harness.twin.bench_of import way_between
 
 PLAN_KEY = "contacts"
 

@@ -25,7 +25,8 @@ from harness.picture.camera_errors import CameraErrors
 from harness.sim.solid.surface_samples import sample_surface
 from harness.skills.exploring.surroundings import nowhere
 from harness.skills.exploring.unknown_space import UnknownStand
-from harness.twin.bench import TwinBench, twin_of
+from harness.twin.bench import TwinBench
+from harness.twin.bench_of import twin_of
 
 MEASURED_SIGMA = 0.03
 """Of sqrt(E / density), relative, where it was measured on a thing of the same material."""

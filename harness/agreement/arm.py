@@ -13,7 +13,8 @@ from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_from_quaternion, rotation_from_vector, transform
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
-from harness.twin.bench import TwinBench, twin_of
+from harness.twin.bench import TwinBench
+from harness.twin.bench_of import twin_of
 from harness.twin.compare import compare_arm
 
 TABLES = 1.0e-3

@@ -18,7 +18,7 @@ from harness.recording.run_folder import RunFiles
 from harness.recording.session import Progress, perform
 from harness.recording.step_file import Step
 from harness.skills.strike import Ask, by_hand, somebody
-from harness.twin.bench import twin_of
+from harness.twin.bench_of import twin_of
 
 WIRES, IN_PROCESS = "wires", "in-process"
 """Mocked benches: each instrument at the far end of its cable, or the same world without cables, in simulated

@@ -14,7 +14,8 @@ from harness.sim.gel.height_map import RasterMesh
 from harness.skills.press import ContactMotion
 from harness.skills.sites import PressLimits, Site, plan_sites
 from harness.skills.strike import StrikeMotion, planner
-from harness.twin.bench import TwinBench, twin_of
+from harness.twin.bench import TwinBench
+from harness.twin.bench_of import twin_of
 from harness.twin.motion import PlannedContact, plan_contact, reachable
 from harness.twin.rehearsal import RehearsalReport, Segment, rehearse
 from harness.twin.strike_motion import PlannedStrike, StrikePlanner

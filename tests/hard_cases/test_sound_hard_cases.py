@@ -27,7 +27,7 @@ from harness.recording.run_folder import station_acquisition, station_calibratio
 from harness.recording.step_file import Step, StepRecord
 from harness.skills.planning import RunPlan
 from harness.skills.press import PressPerformer
-from harness.twin.bench import way_between
+from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
 from tests.support.localization import dials, estimate
 

@@ -12,7 +12,7 @@ from harness.bench.station_file import Station
 from harness.recording.step_file import Step
 from harness.skills.planning import RunPlan
 from harness.skills.press import PressPerformer
-from harness.twin.bench import way_between
+from harness.twin.bench_of import way_between
 
 Readings = dict[str, Reading]
 

@@ -27,7 +27,7 @@ from harness.effects.scene_object import known_object
 from harness.recording.step_file import Step
 from harness.skills.planning import RunPlan
 from harness.skills.press import PressPerformer, Speeds
-from harness.twin.bench import way_between
+from harness.twin.bench_of import way_between
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.bench import in_process_bench
 from mocks.lab_scene import nominal_bench

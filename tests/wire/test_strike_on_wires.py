@@ -25,7 +25,7 @@ from harness.recording.step_file import Step
 from harness.skills.planning import RunPlan
 from harness.skills.press import PressPerformer, Speeds
 from harness.skills.strike import AFTER, BEFORE, POSE
-from harness.twin.bench import way_between
+from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
 
 ROOT = Path(__file__).parents[2]

@@ -14,7 +14,7 @@ from harness.bench.station_file import Station
 from harness.experiment.experiment import Helpers, Planned, Procedure
 from harness.objects.targets import BALL_RADIUS
 from harness.recording.run_folder import RunFiles
-from harness.twin.bench import twin_of, way_between
+from harness.twin.bench_of import twin_of, way_between
 
 GAP = "target"
 """Of a mocked bench, where no other is asked for: a ball on a rigid stand, a sensor not yet calibrated."""

@@ -51,7 +51,7 @@ from harness.recording.observation import Observation, in_time, observe_step
 from harness.recording.run_folder import RunFiles, station_acquisition, station_calibration
 from harness.recording.step_file import Step, StepRecord
 from harness.skills.press import PressPerformer
-from harness.twin.bench import way_between
+from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
 
 

@@ -22,7 +22,7 @@ from harness.recording.run_folder import RunFiles
 from harness.skills.planning import Itinerary, RunPlan
 from harness.skills.press import ContactMotion, PressPerformer
 from harness.skills.sites import Site
-from harness.twin.bench import twin_of, way_between
+from harness.twin.bench_of import twin_of, way_between
 
 STATION = load_station(station_path("mock"))
 CELL = Cell("mug", "close", "default", "known", 71, choose="active")

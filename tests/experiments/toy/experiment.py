@@ -23,7 +23,7 @@ from harness.recording.step_file import StepRecord
 from harness.skills.planning import ContactRequest, plan_run
 from harness.skills.press import PressPerformer
 from harness.skills.sites import PressLimits
-from harness.twin.bench import way_between
+from harness.twin.bench_of import way_between
 
 CLAIMED = 4e-3
 """m, within which it claims 9 answers of 10: a gel is pressed up to 2 mm behind its first touch."""
