@@ -24,9 +24,9 @@ from harness.basics.geometry import apply, transform
 from harness.basics.mesh import Mesh
 from harness.basics.mesh_hull import closed_hull, hull_of
 from harness.sim.gel.height_map import RasterMesh
-from harness.skills.exploring.envelope import PLACES, around, margin_of
 from harness.skills.exploring.lines import LINES, LOWEST, LineTarget
 from harness.skills.exploring.surroundings import Surroundings, rehearsed_strike
+from harness.skills.exploring.unknown_space import PLACES, around, margin_of
 from harness.skills.planning import Itinerary
 from harness.skills.press import ContactMotion
 from harness.skills.sites import PressLimits, Site, plan_sites

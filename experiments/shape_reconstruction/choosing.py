@@ -23,8 +23,7 @@ from harness.basics.geometry import frame_facing, rotation_about, transform
 from harness.bench.sensor import TactileSensor
 from harness.sim.solid.surface_samples import random_points
 from harness.skills.exploring.bayes_risk import bayes_risk, bayes_risk_after
-from harness.skills.exploring.lines import LOWEST, LineTarget
-from harness.skills.exploring.sensor_face import MIDDLE, face_places, gel_first, ways_of
+from harness.skills.exploring.lines import LOWEST, MIDDLE, LineTarget, face_places, gel_first, ways_of
 from harness.skills.exploring.unknown_space import LYING, SeenThing
 
 Chooser = Callable[[ShapeEvidence, ShapeEstimate | None, FloatArray], FloatArray]

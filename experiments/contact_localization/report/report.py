@@ -28,10 +28,9 @@ from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
 from harness.recording.run_folder import RunFiles
 from harness.report.data import AnswerRow, BenchScene, ContactRow, ErrorCurve, ReportData, TwinDeviation
-from harness.report.figures.props import arm_parts, object_part, sensor_parts, table_and_pedestal
+from harness.report.figures.pictures import arm_parts, object_part, sensor_parts, table_and_pedestal
 from harness.report.page import write_report
-from harness.report.run_page import facts_of
-from harness.report.simulated import NO_TRUTH
+from harness.report.run_page import NO_TRUTH, facts_of
 from harness.report.values import Missing
 from harness.report.wording import SENSES
 from harness.skills.press import ContactMotion

@@ -16,10 +16,9 @@ from harness.commands.catalogue import chosen
 from harness.commands.output import ANSWERS, CONSOLE, duration, emit, warn
 
 if TYPE_CHECKING:
-    from harness.authoring.catalogue.build import BuildPlan
-    from harness.authoring.catalogue.record import ObjectRecord
+    from harness.authoring.catalogue.build import BuildPlan, Runner
+    from harness.authoring.catalogue.layout import ObjectRecord
     from harness.authoring.catalogue.rows import ExcludedRow
-    from harness.authoring.catalogue.runner import Runner
     from harness.authoring.catalogue.spec import BuildSpec
     from harness.authoring.catalogue.worker import WorkerLimits
 
@@ -68,8 +67,7 @@ def build(
     """
     options.require_folders(("--out", out), ("--stages", stages))
     from harness.authoring.catalogue.build import build_all, build_plan, held
-    from harness.authoring.catalogue.layout import BuildFolder
-    from harness.authoring.catalogue.settings import write_settings
+    from harness.authoring.catalogue.layout import BuildFolder, write_settings
     from harness.authoring.catalogue.worker import WorkerLimits
     from harness.basics.quantities import TIME
 
@@ -124,7 +122,7 @@ def _spec(
 
 
 def _runner(name: str, workers: int, address: str | None, limits: "WorkerLimits") -> "Runner":
-    from harness.authoring.catalogue.runner import LocalRunner
+    from harness.authoring.catalogue.build import LocalRunner
     from harness.basics.cores import own_cores
     from harness.basics.errors import WrongUse
     from harness.basics.files.named_file import nearest

@@ -220,7 +220,7 @@ def draw(rendered: RenderedSound, path: Path) -> None:
     """Write the picture; it counts among the seconds."""
     from harness.objectfile.audio.strike import pushes
     from harness.report.figures.figures import Album
-    from harness.report.figures.mode_pictures import SHOWN, ShownStrike, colourable, strike_figure
+    from harness.report.figures.sound import SHOWN, ShownStrike, colourable, strike_figure
 
     begun = time.perf_counter()
     made, audio, place = rendered.made, rendered.audio, rendered.place

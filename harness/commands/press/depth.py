@@ -131,8 +131,8 @@ def depth(
     if height_out is not None:
         write_array(height_out, found.height)
     if picture is not None:
-        from harness.report.figures.depth import depth_figure
         from harness.report.figures.figures import Album
+        from harness.report.figures.touch import depth_figure
 
         Album(picture.parent).photograph(picture.stem, depth_figure(found))
     answer = _answer(found, known, points, "gel" if bench is None else "flange")

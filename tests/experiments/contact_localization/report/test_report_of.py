@@ -4,7 +4,7 @@ import pytest
 
 from experiments.contact_localization.report.report import SweepPoint, _by_seconds
 from harness.effects.accuracy import Accuracy
-from harness.report.simulated import _said, flat
+from harness.report.run_page import _said, flat
 from harness.report.values import Missing
 from tests.support.localization import dials
 
