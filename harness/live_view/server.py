@@ -17,9 +17,8 @@ import numpy as np
 
 from harness.basics.errors import TouchstoneError, WrongUse
 from harness.basics.files.named_file import nearest
-from harness.objectfile.vision.settings import LEVELS, RenderSettings, VisionLevel
+from harness.objectfile.vision.render import ObjectVision
 from harness.objectfile.vision.view import FIELD_OF_VIEW, camera_for, light_for
-from harness.objectfile.vision.vision import ObjectVision, vision_level
 from harness.picture.image_file import png_bytes
 from harness.picture.pinhole import DirectionalLight
 
@@ -55,7 +54,6 @@ class ViewRequest:
         field_of_view: rad across the picture's width.
         width: pixels.
         height: pixels.
-        level: of the networks.
     """
 
     camera: Three | None = None
@@ -65,7 +63,6 @@ class ViewRequest:
     field_of_view: float = FIELD_OF_VIEW
     width: int = _START
     height: int = _START
-    level: VisionLevel = "fused"
 
 
 NAMES = tuple(field.name for field in fields(ViewRequest))
@@ -81,7 +78,6 @@ _READ: Mapping[str, Callable[[str], Any]] = {
     **dict.fromkeys(_VECTORS, _three),
     **dict.fromkeys(_COUNTS, int),
     "field_of_view": float,
-    "level": vision_level,
 }
 _MEANT = {
     **dict.fromkeys(_VECTORS, "three numbers with commas between them"),
@@ -96,7 +92,7 @@ class ViewFrame:
 
     Attributes:
         png: of it, before white.
-        said: of how it was made: level, samples, rays, and seconds by stage.
+        said: of how it was made: samples, rays, and seconds by stage.
     """
 
     png: bytes
@@ -117,11 +113,10 @@ class LiveFrames:
         self._drawing = threading.Lock()
 
     def start(self) -> Mapping[str, Any]:
-        """What a page begins with: name, levels, and the camera and lamp that nobody chose."""
+        """What a page begins with: name, and the camera and lamp that nobody chose."""
         camera = camera_for(self._vision.surface, _START, _START)
         return {
             "object": self.name,
-            "levels": list(LEVELS),
             "networks": self._vision.entry.level,
             "camera": camera.eye.tolist(),
             "look_at": self._vision.surface.bounds.mean(axis=0).tolist(),
@@ -151,14 +146,13 @@ class LiveFrames:
         light = light_for(camera) if asked.light is None else DirectionalLight(np.array(asked.light))
         with self._drawing:
             waited = time.perf_counter()
-            found = self._vision.picture(camera, light, RenderSettings(level=asked.level))
+            found = self._vision.picture(camera, light)
             drawn = time.perf_counter()
         png = png_bytes(found.image.display())
         ended = time.perf_counter()
         return ViewFrame(
             png,
             {
-                "level": found.level,
                 "samples": found.samples,
                 "rays": found.rays,
                 "seconds": {"wait": waited - begun, "render": drawn - waited, "encode": ended - drawn},

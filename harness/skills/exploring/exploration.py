@@ -8,7 +8,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.bench.reading import Reading
 from harness.bench.station import BARE, LOOK, Bench
-from harness.recording.look_pictures import BARE_IMAGE, IMAGE
+from harness.recording.observation import BARE_IMAGE, IMAGE
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step
 from harness.skills.press import After, PressPerformer, Speeds
