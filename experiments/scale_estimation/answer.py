@@ -145,7 +145,8 @@ class ScaleAnswering:
             self.left_out.append(str(record.step.parameters["why"]))
             return
         try:
-            outline = outline_of(record)
+            pictures = look_pictures(record)
+            outline = None if pictures is None else read_outline(mask_by_background(*pictures))
         except DataRefused as refusal:
             self.outline = FitRefused(str(refusal))
             return
@@ -296,16 +297,6 @@ class ScaleAnswering:
         if read or not self.refused_pictures:
             return None
         return FitRefused(f"no contact's picture may be used; {self.refused_pictures[0]}")
-
-
-def outline_of(record: StepRecord) -> SeenOutline | None:
-    """The object's outline in the camera's pictures; None where the step was no look.
-
-    Raises:
-        DataRefused: the object is not seen.
-    """
-    pictures = look_pictures(record)
-    return None if pictures is None else read_outline(mask_by_background(*pictures))
 
 
 def patch_of_contact(seen: Observation, calibration: TactileCalibration, pitch: float) -> Patch | None:

@@ -80,16 +80,12 @@ def patch_of(heights: FloatArray, pitch: float, base_from_gel: FloatArray) -> Pa
     slope = np.linalg.lstsq(terms, in_gel[:, 2], rcond=None)[0]
     normal = np.array([slope[0], slope[1], -1.0])
     normal /= np.linalg.norm(normal)
-    chosen = in_gel[_spread(in_gel[:, :2], POINTS)]
-    points, rotation = apply(base_from_gel, chosen), base_from_gel[:3, :3]
-    return Patch(read_only(points), read_only(rotation @ normal), read_only(base_from_gel.copy()))
-
-
-def _spread(places: FloatArray, count: int) -> list[int]:
-    """Indices of places far from each other: each the farthest from those before, the middle first."""
-    chosen = [int(np.linalg.norm(places - places.mean(axis=0), axis=1).argmin())]
-    apart = np.linalg.norm(places - places[chosen[0]], axis=1)
-    while len(chosen) < count:
+    # Places far from each other: each the farthest from those before, the middle first.
+    level = in_gel[:, :2]
+    chosen = [int(np.linalg.norm(level - level.mean(axis=0), axis=1).argmin())]
+    apart = np.linalg.norm(level - level[chosen[0]], axis=1)
+    while len(chosen) < POINTS:
         chosen.append(int(apart.argmax()))
-        apart = np.minimum(apart, np.linalg.norm(places - places[chosen[-1]], axis=1))
-    return chosen
+        apart = np.minimum(apart, np.linalg.norm(level - level[chosen[-1]], axis=1))
+    points, rotation = apply(base_from_gel, in_gel[chosen]), base_from_gel[:3, :3]
+    return Patch(read_only(points), read_only(rotation @ normal), read_only(base_from_gel.copy()))

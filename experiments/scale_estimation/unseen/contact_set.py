@@ -67,21 +67,16 @@ def features(ways: Sequence[GelWay]) -> tuple[FloatArray, FloatArray, FloatArray
         normal = np.zeros(3) if way.normal is None else way.normal
         rows[k] = np.concatenate([way.end / _LENGTH, apart, normal, way.direction, [way.normal is not None]])
         kinds[k, 0 if way.normal is not None else 1] = 1.0
-    return rows, kinds, _whole(taken)
-
-
-def _whole(ways: Sequence[GelWay]) -> FloatArray:
-    """How far the touched places are apart, as logarithms of m; how high; how many met and missed."""
-    met = np.array([way.end for way in ways if way.normal is not None]).reshape(-1, 3)
+    # How far the touched places are apart, as logarithms of m; how high; how many met and missed.
+    met = np.array([way.end for way in taken if way.normal is not None]).reshape(-1, 3)
     if not len(met):
-        return np.array([np.log(_LEAST)] * 4 + [0.0, 0.1 * len(ways)])
+        return rows, kinds, np.array([np.log(_LEAST)] * 4 + [0.0, 0.1 * len(taken)])
     flat = met[:, :2]
-    apart = np.linalg.norm(flat[:, None] - flat[None], axis=2).max()
-    centred = flat - flat.mean(axis=0)
-    spread = np.linalg.svd(centred, compute_uv=False) / np.sqrt(len(flat))
-    lengths = np.array([apart, met[:, 2].max(), spread[0], spread[-1] if len(spread) > 1 else 0.0])
-    counts = 0.1 * len(met), 0.1 * (len(ways) - len(met))
-    return np.concatenate([np.log(np.maximum(lengths, 0.0) + _LEAST), counts])
+    widest = np.linalg.norm(flat[:, None] - flat[None], axis=2).max()
+    spread = np.linalg.svd(flat - flat.mean(axis=0), compute_uv=False) / np.sqrt(len(flat))
+    lengths = np.array([widest, met[:, 2].max(), spread[0], spread[-1] if len(spread) > 1 else 0.0])
+    counts = 0.1 * len(met), 0.1 * (len(taken) - len(met))
+    return rows, kinds, np.concatenate([np.log(np.maximum(lengths, 0.0) + _LEAST), counts])
 
 
 def imprint_features(imprints: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
