@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from experiments.scale_estimation.dials import STARTS, TURNS, YAWS
+from experiments.scale_estimation.dials import STARTS
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief, fused
@@ -239,8 +239,7 @@ class ScaleAnswering:
             return FitRefused(str(refusal))
 
     def _by_sight(self) -> Sight:
-        model, yaws = self.model, int(self.accuracy[YAWS.name])
-        return by_sight(model.view, self._seen(), model.nominal, model.sizes, yaws)
+        return by_sight(self.model.view, self._seen(), self.model.nominal, self.model.sizes)
 
     def with_shape(self) -> dict[str, Callable[[], Said]]:
         """How each sense answers of an object whose shape is the scene's mesh."""
@@ -289,8 +288,7 @@ class ScaleAnswering:
         refusal = self._no_picture(self.ways)
         if refusal is not None:
             raise refusal
-        turns, same_place = int(self.accuracy[TURNS.name]), self.model.same_place
-        return ways_alone(self.ways, self.model.sizes, turns, same_place)
+        return ways_alone(self.ways, self.model.sizes, self.model.same_place)
 
     def _no_picture(self, read: Sequence[object]) -> FitRefused | None:
         """Why touch has no answer where pictures were taken and none of them was read."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from experiments.scale_estimation.answer import ScaleAnswering
-from experiments.scale_estimation.dials import KNOBS, OF_SHAPE, OWN
+from experiments.scale_estimation.dials import KNOBS, STARTS
 from experiments.scale_estimation.explorer import performer, plan, smallest_error, steps_of
 from experiments.scale_estimation.report import write
 from experiments.scale_estimation.result import lines_of, result_of
@@ -35,18 +35,14 @@ def _answering(run: RunFiles, accuracy: Accuracy) -> ScaleAnswering:
     return answering
 
 
-_ALL_DIALS = plain_measurement(NAME, *OWN)
+_ALL_DIALS = plain_measurement(NAME, STARTS)
 
 
 def _settings(thorough: bool, chosen: Mapping[str, Sequence[str]], scenes: Any) -> tuple[Setting, ...]:
-    """Every dial at its default, and each that matters to a chosen shape turned from there."""
-    matter = {knob.name for shape in chosen["shape"] for knob in OF_SHAPE[shape]}
-    defaults = {knob.name: knob.default for knob in OWN}
-    return tuple(
-        setting
-        for setting in _ALL_DIALS.settings(thorough, chosen, scenes)
-        if all(level == defaults[name] or name in matter for name, level in setting.items())
-    )
+    """Every level of the dial where the shape is known; its default alone where it is not."""
+    settings = _ALL_DIALS.settings(thorough, chosen, scenes)
+    known = "known" in chosen["shape"]
+    return tuple(each for each in settings if known or each[STARTS.name] == STARTS.default)
 
 
 MEASUREMENT = replace(
@@ -89,7 +85,7 @@ EXPERIMENT = Experiment(
     },
     error_key="until",
     smallest_error=smallest_error,
-    budgets=plain_budgets(NAME, steps_of, *OWN),
+    budgets=plain_budgets(NAME, steps_of, STARTS),
     sizes_unknown=True,
     measured="the size and the place of the object are what this run measures",
 )

@@ -14,6 +14,13 @@ Level = str | int | float
 Setting = Mapping[str, Level]
 """Levels of some dials; what it leaves open is at its default."""
 
+RETIRED_KNOBS: Mapping[str, str] = MappingProxyType({
+    "scale.yaws": "leave it out: the fit of the outline starts from 12 turns",
+    "scale.turns": "leave it out: touch of an unknown shape is averaged over 12 turns",
+    "sound.radiation": "leave it out: every piece of the surface radiates as a monopole",
+})  # fmt: skip
+"""Knobs of earlier versions, and what to do instead of setting them."""
+
 LevelT = TypeVar("LevelT", bound=Level, covariant=True)
 
 
@@ -83,7 +90,7 @@ class Accuracy(Mapping[str, Level]):
         by_name = {knob.name: knob for knob in self.knobs}
         for name in self.levels:
             if name not in by_name:
-                raise WrongUse(f"no knob {name!r}; {nearest(name, by_name)}")
+                raise _unknown_knob(name, by_name)
         chosen = {name: by_name[name].checked(level) for name, level in self.levels.items()}
         whole = {knob.name: chosen.get(knob.name, knob.default) for knob in self.knobs}
         object.__setattr__(self, "levels", MappingProxyType(whole))
@@ -116,7 +123,7 @@ class Accuracy(Mapping[str, Level]):
             if not equals:
                 raise WrongUse(f"{text!r} does not set a knob; write KNOB=LEVEL, for example touch.gel=fast")
             if name.strip() not in by_name:
-                raise WrongUse(f"no knob {name.strip()!r}; {nearest(name.strip(), by_name)}")
+                raise _unknown_knob(name.strip(), by_name)
             changes[name.strip()] = by_name[name.strip()].read(level)
         return self.with_(changes)
 
@@ -126,7 +133,7 @@ class Accuracy(Mapping[str, Level]):
 
     def __getitem__(self, name: str) -> Level:
         if name not in self.levels:
-            raise WrongUse(f"no knob {name!r}; {nearest(name, self.levels)}")
+            raise _unknown_knob(name, self.levels)
         return self.levels[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -134,3 +141,27 @@ class Accuracy(Mapping[str, Level]):
 
     def __len__(self) -> int:
         return len(self.levels)
+
+
+def current_levels(knobs: Iterable[Knob[Level]], stored: Mapping[str, Level]) -> dict[str, Level]:
+    """Translate levels that an earlier version stored: leave out retired knobs, replace removed levels.
+
+    A removed level becomes the default of its knob.
+
+    Raises:
+        WrongUse: a knob or a level that no version had.
+    """
+    by_name, found = {knob.name: knob for knob in knobs}, {}
+    for name, level in stored.items():
+        if name not in RETIRED_KNOBS:
+            if name not in by_name:
+                raise _unknown_knob(name, by_name)
+            knob = by_name[name]
+            found[name] = knob.default if level in knob.removed else knob.checked(level)
+    return found
+
+
+def _unknown_knob(name: str, names: Iterable[str]) -> WrongUse:
+    if name in RETIRED_KNOBS:
+        return WrongUse(f"there is no knob {name} any more; {RETIRED_KNOBS[name]}")
+    return WrongUse(f"no knob {name!r}; {nearest(name, names)}")

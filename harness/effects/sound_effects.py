@@ -23,7 +23,7 @@ from harness.sim.modal.modal import (
 from harness.sim.modal.modes import dampings
 from harness.sim.solid.walls import walled
 from harness.sim.sound.microphone_response import as_heard
-from harness.sim.sound.modal_radiation import RadiationLevel, radiation
+from harness.sim.sound.modal_radiation import radiation
 from harness.sim.sound.modal_sound import ring
 from harness.sim.sound.room import reverberated
 
@@ -49,9 +49,6 @@ SHAPES = Knob(
     "method",
     "elements",
     "the ObjectFile's network, its table, or finite elements",
-)
-RADIATION = Knob(
-    "sound.radiation", ("bound", "monopoles"), "", "method", "monopoles", "how the surface moves the air"
 )
 
 SOUND = Condition(lambda f: f.scene.sensors.sound, "sensors.sound is true", "sensors.sound is false")
@@ -87,10 +84,9 @@ def _from_file(level: "AudioLevel") -> Implementation:
     return Implementation(needs, _modes_of_file(level), when=NAMED, knobs=(MODES,))
 
 
-def _sound(given: Given, levels: Levels) -> FloatArray:
+def _sound(given: Given, _levels: Levels) -> FloatArray:
     modes, strike = from_arrays(given["object.modes"]), given["strike"]
-    how: RadiationLevel = "bound" if levels[RADIATION.name] == "bound" else "monopoles"
-    loudness = radiation(modes, given["microphone"].distance, how)
+    loudness = radiation(modes, given["microphone"].distance)
     gains = modes.gains(strike.points, strike.directions)
     decays = dampings(modes.frequencies, given["object.material"])
     return ring(modes.frequencies, decays, gains * loudness, strike.force, strike.rate)
@@ -121,7 +117,6 @@ SOUND_EFFECTS = (
         ("object.modes", "object.material", "strike", "microphone"),
         _sound,
         when=SOUND,
-        knobs=(RADIATION,),
     ),
     Effect(
         "room.reverberation",

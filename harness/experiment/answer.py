@@ -14,7 +14,7 @@ from harness.basics.files.foreign_file import MOST_JSON, read_bounded
 from harness.basics.npz_file import write_arrays
 from harness.basics.whole_file import write_text_whole
 from harness.bench.device import Health
-from harness.effects.accuracy import Accuracy, Level
+from harness.effects.accuracy import Accuracy, Level, current_levels
 from harness.effects.explain import as_json, scene_plan
 from harness.experiment.compare import Comparison, compare
 from harness.experiment.experiment import Answering, Experiment, Scored
@@ -200,10 +200,9 @@ def levels_of_result(experiment: Experiment, folder: Path) -> dict[str, Level]:
     path = folder / RESULT
     if not path.exists():
         return {}
-    known = {knob.name: knob for knob in experiment.knobs}
     try:
         levels = json.loads(read_bounded(path, "a result", MOST_JSON))["accuracy"]
-        return {name: known[name].checked(level) for name, level in levels.items()}
+        return current_levels(experiment.knobs, levels)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, WrongUse) as error:
         raise RecordingDamaged(
             f"{path} does not say at which levels it was found; replay the run into another folder"

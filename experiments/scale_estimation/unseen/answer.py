@@ -9,7 +9,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from experiments.scale_estimation.dials import TURNS
 from experiments.scale_estimation.size import Belief, SizeRange, fused
 from experiments.scale_estimation.touch.fit import USUAL_PLACE
 from experiments.scale_estimation.touch.patch import Patch
@@ -94,7 +93,6 @@ def strikes_alone(strikes: Sequence[Strike], material: Material, sizes: SizeRang
 def ways_alone(
     ways: Sequence[GelWay],
     sizes: SizeRange,
-    turns: int = TURNS.default,
     same_place: PlaceTolerance = USUAL_PLACE,
 ) -> ShapelessAnswer:
     """Estimate the size from the straight paths of the gel, those that met the object and those that did not.
@@ -102,7 +100,6 @@ def ways_alone(
     Args:
         ways: paths of one exploration.
         sizes: range of sizes that is asked about.
-        turns: number of rotations about the vertical over which the network is averaged.
         same_place: largest differences between two paths to one place; the first of them counts.
 
     Raises:
@@ -113,7 +110,7 @@ def ways_alone(
     lines = np.array([(way.end, way.direction) for way in ways]).reshape(-1, 2, 3)
     places = group_by_place(lines[:, 0], lines[:, 1], same_place)
     distinct = [ways[k] for k in np.unique(places, return_index=True)[1]]
-    belief, distance = by_ways(distinct, sizes, turns)
+    belief, distance = by_ways(distinct, sizes)
     # Farther off than usual, the network has given an even density its share already.
     novel = NOVEL_SIGMA * min(distance, 1.0)
     return ShapelessAnswer(belief.widened(float(np.hypot(shape_sigma("touch"), novel))), distance)

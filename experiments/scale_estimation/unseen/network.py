@@ -8,7 +8,6 @@ from importlib.resources import files
 
 import numpy as np
 
-from experiments.scale_estimation.dials import TURNS
 from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.unseen import contact_set, spectrogram
 from harness.basics.arrays import FloatArray, read_only
@@ -27,6 +26,9 @@ CODE = 32
 
 UNKNOWN_SHARE = 0.02
 """Of the density that is even whatever is said."""
+
+TURNS = 12
+"""Rotations about the vertical over which touch is averaged."""
 
 _GREATEST = 30.0
 """Of any number that a network is given."""
@@ -92,9 +94,7 @@ class SizeNetwork:
         return Belief.of(sizes, np.log(np.maximum(mixed, 1e-300))), distance
 
 
-def by_ways(
-    ways: Sequence[contact_set.GelWay], sizes: SizeRange, turns: int = TURNS.default
-) -> tuple[Belief, float]:
+def by_ways(ways: Sequence[contact_set.GelWay], sizes: SizeRange, turns: int = TURNS) -> tuple[Belief, float]:
     """What the ways of the gel say, and how far they are from the family.
 
     Args:

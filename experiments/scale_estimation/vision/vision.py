@@ -36,6 +36,9 @@ _SCAN = np.linspace(-5.0, 5.0, 21)
 _SCAN_ROUNDS = 4
 _FAR = 20.0
 _MOST_MODES = 4
+_FIRST_TURNS = 12
+"""Rotations about the vertical from which the fit of the size starts."""
+
 _TURNS = 24
 _ROUNDS_OF_TURNS = 12
 _TURNS_APART = 0.1
@@ -56,7 +59,7 @@ class Sight:
     seconds: float
 
 
-def by_sight(view: View, outline: SeenOutline, nominal: float, sizes: SizeRange, yaws: int = 12) -> Sight:
+def by_sight(view: View, outline: SeenOutline, nominal: float, sizes: SizeRange) -> Sight:
     """The size at which the model's outline is that of the picture.
 
     Args:
@@ -64,14 +67,13 @@ def by_sight(view: View, outline: SeenOutline, nominal: float, sizes: SizeRange,
         outline: of the picture.
         nominal: m, the longest side of the model.
         sizes: asked about.
-        yaws: that the fit starts from.
 
     Raises:
         FitRefused: at no size and turn is it this object's outline.
     """
     began = time.perf_counter()
     problem = OutlineProblem(view, outline)
-    begun = sorted(problem.fit(_starts(view, outline, yaws), _FIRST_ROUNDS), key=lambda fit: fit.cost)
+    begun = sorted(problem.fit(_starts(view, outline, _FIRST_TURNS), _FIRST_ROUNDS), key=lambda fit: fit.cost)
     fits = problem.fit(np.array([fit.unknowns for fit in begun[:_FOLLOWED]]), _ROUNDS)
     best = min(fits, key=lambda fit: fit.cost)
     _require_same(view, best)

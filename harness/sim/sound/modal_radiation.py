@@ -1,7 +1,5 @@
 """How loud each mode is in the open, from the way the surface moves."""
 
-from typing import Literal
-
 import numpy as np
 
 from harness.basics.arrays import FloatArray
@@ -17,26 +15,21 @@ SPEED_OF_SOUND = 343.2
 
 _DIRECTIONS = 24
 
-RadiationLevel = Literal["bound", "monopoles"]
 
-
-def radiation(modes: Modes, distance: float, level: RadiationLevel = "monopoles") -> FloatArray:
+def radiation(modes: Modes, distance: float) -> FloatArray:
     """``(m,)`` Pa sqrt(kg) / (N s): the pressure at a distance of each mode, for a unit gain.
 
     Times the gain at the struck point (``Modes.gains``) it is the amplitude that ``ring`` takes.
-    A mode's surface accelerates by ``w`` times its shape for a unit impulse.
+    A mode's surface accelerates by ``w`` times its shape for a unit impulse. Every piece of the surface is a
+    source of its own in free air, rms over all directions, so that parts that move against each other cancel
+    (Rayleigh's integral without baffle; the shadow of the object on its own sound is left out).
 
     Args:
         modes: of the object.
         distance: m from the object's middle, above zero.
-        level: ``"bound"`` as if the whole surface moved out together, by its rms normal
-            acceleration, which nothing exceeds; ``"monopoles"`` as if every piece of the surface
-            were a source of its own in free air, rms over all directions, so that parts that move
-            against each other cancel (Rayleigh's integral without baffle; the shadow of the
-            object on its own sound is left out).
 
     Raises:
-        WrongUse: a distance that is not above zero, or an unknown level.
+        WrongUse: a distance that is not above zero.
     """
     if not (np.isfinite(distance) and distance > 0.0):
         raise WrongUse(f"a microphone {distance:g} m from the object hears nothing; say a distance above 0")
@@ -44,13 +37,7 @@ def radiation(modes: Modes, distance: float, level: RadiationLevel = "monopoles"
     areas = _node_areas(modes)
     outward = np.einsum("nmd,nd->nm", modes.shapes, modes.normals)
     per_volume = AIR_DENSITY * omega / (4.0 * np.pi * distance)
-    match level:
-        case "bound":
-            total = areas.sum()
-            return np.asarray(per_volume * total * np.sqrt(areas @ outward**2 / total))
-        case "monopoles":
-            return np.asarray(per_volume * _flow(modes, areas[:, None] * outward, omega / SPEED_OF_SOUND))
-    raise WrongUse(f"no radiation level {level!r}; say 'bound' or 'monopoles'")
+    return np.asarray(per_volume * _flow(modes, areas[:, None] * outward, omega / SPEED_OF_SOUND))
 
 
 def _flow(modes: Modes, flow: FloatArray, wavenumbers: FloatArray) -> FloatArray:

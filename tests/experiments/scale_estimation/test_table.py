@@ -1,12 +1,13 @@
 """The table's trivial rows: what they say of a model's own readings."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from experiments.scale_estimation.baselines import by_area, by_box, by_first_peak, constant, random_error
-from experiments.scale_estimation.dials import OWN, STARTS, TURNS, YAWS
+from experiments.scale_estimation.dials import STARTS
 from experiments.scale_estimation.experiment import MEASUREMENT
 from experiments.scale_estimation.size import SizeRange
 from experiments.scale_estimation.table import METHODS, ScaleCell, run_cell, scene_of
@@ -14,7 +15,6 @@ from experiments.scale_estimation.unseen.paper.inputs import INPUTS
 from experiments.scale_estimation.unseen.paper.rows import PAPER_ROWS
 from harness.bench.scene import scene_from_json
 from harness.bench.station_file import Station
-from harness.effects.accuracy import Knob, Level
 from tests.experiments.scale_estimation.test_paper_networks import write_means
 from tests.experiments.scale_estimation.test_sound import NOMINAL, model, peaks_at
 from tests.experiments.scale_estimation.test_vision import nominal, outline_at, view_of
@@ -84,13 +84,11 @@ def test_networks_that_answer_a_run_are_no_part_of_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("shapes", "dials"),
-    [(["known"], {YAWS, STARTS}), (["unknown"], {TURNS}), (["known", "unknown"], {YAWS, STARTS, TURNS})],
+    ("shapes", "levels"),
+    [(["known"], STARTS.levels), (["unknown"], [STARTS.default]), (["known", "unknown"], STARTS.levels)],
 )
-def test_a_cost_curve_turns_the_dials_that_the_answer_depends_on(
-    shapes: list[str], dials: set[Knob[Level]]
+def test_a_cost_curve_turns_the_dial_that_the_answer_depends_on(
+    shapes: list[str], levels: Sequence[int]
 ) -> None:
     settings = MEASUREMENT.settings(False, {"shape": shapes}, {})
-    for knob in OWN:
-        turned = {setting[knob.name] for setting in settings}
-        assert turned == (set(knob.levels) if knob in dials else {knob.default})
+    assert {setting[STARTS.name] for setting in settings} == set(levels)

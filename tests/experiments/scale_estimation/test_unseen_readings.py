@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from experiments.scale_estimation.dials import TURNS
 from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.unseen.answer import (
     NOVEL_SIGMA,
@@ -14,7 +13,7 @@ from experiments.scale_estimation.unseen.answer import (
 )
 from experiments.scale_estimation.unseen.contact_set import MOST, GelWay
 from experiments.scale_estimation.unseen.contact_set import features as features_of_ways
-from experiments.scale_estimation.unseen.network import by_ways, shipped
+from experiments.scale_estimation.unseen.network import TURNS, by_ways, shipped
 from experiments.scale_estimation.unseen.spectrogram import BANDS, features
 from experiments.scale_estimation.unseen.training.contact_samples import TouchableShape, contact_sample
 from harness.basics.arrays import FloatArray
@@ -115,7 +114,7 @@ def ways(size: float = 0.15, family: str = "cup", seed: int = 3) -> list[GelWay]
 def test_no_bearing_is_special() -> None:
     made = ways()
     belief, distance = by_ways(made, RANGE)
-    turned, far = by_ways([way.turned(4.0 * np.pi / TURNS.default) for way in made], RANGE)
+    turned, far = by_ways([way.turned(4.0 * np.pi / TURNS) for way in made], RANGE)
     assert turned.log_density == pytest.approx(belief.log_density, abs=1e-3)
     assert far == pytest.approx(distance, rel=1e-3)
     between, _ = by_ways([way.turned(0.37) for way in made], RANGE)
@@ -131,9 +130,8 @@ def test_more_turns_bring_the_answer_nearer_to_that_of_all_turns() -> None:
         pairs = zip(found, exact, strict=True)
         return float(sum(np.abs(np.exp(a.log_density) - np.exp(b.log_density)).sum() for a, b in pairs))
 
-    coarse, *_, fine = (off(turns) for turns in TURNS.levels)
-    assert off(TURNS.default) < 0.5 * coarse
-    assert fine < off(TURNS.default)
+    assert off(TURNS) < 0.5 * off(1)
+    assert off(24) < off(TURNS)
 
 
 def test_the_order_of_contacts_does_not_matter() -> None:

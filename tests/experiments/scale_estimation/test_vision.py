@@ -79,13 +79,6 @@ def test_a_drawn_mask_gives_it_within_a_hundredth() -> None:
         assert found.belief.size == pytest.approx(scale * nominal(view), rel=0.01)
 
 
-def test_more_turns_to_begin_from_change_no_answer() -> None:
-    view = view_of("mug")
-    outline = outline_at(view, 1.2, 0.0, 0.01, 2.0)
-    sizes = [by_sight(view, outline, nominal(view), RANGE, yaws).belief.size for yaws in (12, 24)]
-    assert sizes[0] == pytest.approx(sizes[1], rel=1e-3)
-
-
 def test_what_hides_a_side_leaves_the_size_and_widens_it() -> None:
     view = view_of("mug")
     whole = outline_at(view, 1.3)

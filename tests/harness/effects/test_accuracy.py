@@ -6,7 +6,7 @@ from harness.basics.errors import WrongUse
 from harness.effects.accuracy import Accuracy, Knob, Level
 
 GRID = Knob("touch.grid", (30, 60, 120), "px", "number", 60)
-OPTICS = Knob("touch.optics", ("smooth", "fast", "exact"), "", "method", "fast")
+OPTICS = Knob("touch.optics", ("fast", "exact"), "", "method", "fast")
 ZERO = Knob("rounds", (0, 1, 3), "", "number", 3)
 KNOBS = (GRID, OPTICS, ZERO)
 
@@ -38,6 +38,8 @@ def test_an_operator_sets_knobs_in_text() -> None:
         ("touch.grid=many", "is not a number"),
         ("touch.optics=exat", "did you mean 'exact'"),
         ("touch.grid", "KNOB=LEVEL"),
+        ("touch.optics=smooth", "use touch.optics=fast"),
+        ("scale.yaws=12", "no knob scale.yaws any more; leave it out"),
     ],
 )
 def test_an_unknown_knob_or_level_is_refused_with_the_nearest(text: str, said: str) -> None:
