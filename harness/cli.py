@@ -164,7 +164,7 @@ COMMANDS = {
         "Find the dots printed on a gel, from pictures of it at rest.",
     ),
     "tables rendering": Command(
-        "experiments.baselines.command:rendering",
+        "experiments.paper.command:rendering",
         "Time and quality of rendering: the paper's tables 1 and 2, with its 1.0 trained and measured here.",
     ),
     "sim modes": Command(

@@ -9,7 +9,7 @@ from harness.commands import options
 from harness.commands.output import CONSOLE, emit, share_progress, warn
 
 if TYPE_CHECKING:
-    from experiments.baselines.bench import Sense
+    from experiments.paper.rendering import Sense
     from harness.objectfile.file import ObjectFile
 
 
@@ -44,8 +44,8 @@ def rendering(
     Try: touchstone tables rendering --object mug
     """
     options.require_folders(("--out", out))
-    from experiments.baselines.bench import RenderingWork
-    from experiments.baselines.table import (
+    from experiments.paper.rendering import RenderingWork
+    from experiments.paper.rendering_table import (
         RenderingCounts,
         as_csv,
         machine_text,
@@ -70,7 +70,7 @@ def rendering(
     if json:
         emit({"schema": 1, "machine": machine_text(), "rows": [plain_rendering(row) for row in rows]})
         return 0
-    from experiments.baselines.printed import print_tables
+    from experiments.paper.rendering_table import print_tables
 
     print_tables(rows, machine_text())
     CONSOLE.print(f"rows: {out / 'rows.csv'}", markup=False)
@@ -92,7 +92,7 @@ def _senses(wanted: list[str] | None) -> "list[Sense]":
     Raises:
         WrongUse: a sense that there is not.
     """
-    from experiments.baselines.bench import SENSES
+    from experiments.paper.rendering import SENSES
     from harness.basics.errors import WrongUse
     from harness.basics.files.named_file import nearest
 

@@ -7,9 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.baselines.bench import MadeMethod, RenderingMethod, RenderingWork, Sense
-from experiments.baselines.measure import ROUNDS, MeasuredMethod, measure_sense, timed_in_turn
-from experiments.baselines.stored_graph import TorchMissing, stored_graph
+from experiments.paper.rendering import (
+    ROUNDS,
+    MadeMethod,
+    MeasuredMethod,
+    RenderingMethod,
+    RenderingWork,
+    Sense,
+    TorchMissing,
+    measure_sense,
+    stored_graph,
+    timed_in_turn,
+)
 from harness.basics.arrays import AnyArray
 from harness.basics.store import Store
 
@@ -121,7 +130,7 @@ def test_a_graph_is_trained_once_and_torch_is_asked_for_only_then(
 ) -> None:
     store = Store(tmp_path)
     data, seconds = stored_graph(store, ("one", 1), "one", lambda: b"graph", torch=False)
-    monkeypatch.setattr("experiments.baselines.stored_graph.find_spec", lambda name: None)
+    monkeypatch.setattr("experiments.paper.rendering.find_spec", lambda name: None)
     assert stored_graph(store, ("one", 1), "one", lambda: b"other") == (data, seconds) == (b"graph", seconds)
     with pytest.raises(TorchMissing, match=r"pip install"):
         stored_graph(store, ("two", 1), "two", lambda: b"other")

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from experiments.baselines.look.bench import DISTANCE
-from experiments.baselines.look.field import UniformField, ball_of
-from experiments.baselines.within import is_within
+from experiments.paper.hexahedra import is_within
+from experiments.paper.look import DISTANCE, UniformField, ball_of
 from harness.authoring.vision.data import around
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh
@@ -81,10 +80,8 @@ def test_places_within_a_closed_surface_are_told_from_those_without() -> None:
 
 def test_a_field_that_was_trained_for_seconds_beats_white_alone() -> None:
     pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
-    from experiments.baselines.look.bench import ViewBench, shown
-    from experiments.baselines.look.field import opened_field
-    from experiments.baselines.settings import FieldSpec
-    from experiments.baselines.training.field import train_field
+    from experiments.paper.look import FieldSpec, ViewBench, opened_field, shown
+    from experiments.paper.rendering_training import train_field
     from harness.authoring.vision.data import held_out_pictures
     from harness.authoring.vision.metrics import reference_pictures
     from harness.sim.light.appearance_source import builtin_appearance

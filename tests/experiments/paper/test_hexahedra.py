@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from experiments.baselines.sound.hexahedra import cube_matrices, hexahedral_modes, voxel_cubes
+from experiments.paper.hexahedra import cube_matrices, hexahedral_modes, voxel_cubes
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import MeshRefused
 from harness.basics.materials import MATERIALS, Material

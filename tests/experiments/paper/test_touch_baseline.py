@@ -5,11 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.baselines.bench import RenderingWork
-from experiments.baselines.settings import FitSpec
-from experiments.baselines.touch.bench import MIDDLE, TouchBench, touch_bench
-from experiments.baselines.touch.colours import pixel_places
-from experiments.baselines.touch.methods import first_touch, untouched
+from experiments.paper.rendering import FitSpec, RenderingWork
+from experiments.paper.touch import MIDDLE, TouchBench, first_touch, pixel_places, touch_bench, untouched
 from harness.authoring.touch.data import DEPTHS, MOST_TILT
 from harness.basics.store import Store
 from tests.samples.touch_bench import ball
@@ -57,7 +54,7 @@ def test_a_network_that_was_trained_for_seconds_beats_one_colour(
 ) -> None:
     pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
     small = FitSpec(depth=3, width=64, octaves=4, steps=150, batch=2048, rate=4e-3)
-    monkeypatch.setattr("experiments.baselines.touch.methods.COLOURS", small)
+    monkeypatch.setattr("experiments.paper.touch.COLOURS", small)
     picture = first_touch(bench, work(tmp_path)).make().render(0)
     mean = np.broadcast_to(bench.picture(bench.maps[0]).mean(axis=(0, 1)), picture.shape)
     assert bench.scores(0, picture)["psnr_db"] > bench.scores(0, mean)["psnr_db"] + 3.0

@@ -5,11 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.baselines.bench import RenderingWork
-from experiments.baselines.settings import FitSpec
-from experiments.baselines.sound.bench import StrikeBench, summed
-from experiments.baselines.sound.methods import sound_methods
-from experiments.baselines.sound.spectrogram import SpectrumBasis, sound_of_spectrum
+from experiments.paper.rendering import FitSpec, RenderingWork
+from experiments.paper.sound import SpectrumBasis, StrikeBench, sound_methods, sound_of_spectrum, summed
 from harness.authoring.audio.data import split_nodes
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
@@ -60,7 +57,7 @@ def test_a_network_that_was_trained_for_seconds_is_nearer_than_silence(
 ) -> None:
     pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
     small = FitSpec(depth=2, width=64, steps=100, batch=2048, rate=4e-3)
-    monkeypatch.setattr("experiments.baselines.sound.methods.SPECTROGRAM", small)
+    monkeypatch.setattr("experiments.paper.sound.SPECTROGRAM", small)
     bench = plate_bench()
     work = RenderingWork(Store(tmp_path), lambda doing, share: None)
     method = next(each for each in sound_methods(bench, work) if each.column == "1.0 here")

@@ -1,1 +1,0 @@
-"""The sound of a strike: queries, methods, and the baseline of 1.0."""

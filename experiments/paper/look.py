@@ -1,0 +1,339 @@
+"""Tables 1 and 2 of vision: views and their reference, 1.0's field, the paper's cells, ours.
+
+1.0's look is one network for the whole object, and samples spread evenly along every ray. The layout is the
+published one (``harness.authoring.published.modules.Osf``): place, view and light to a raw colour and
+density, in a frame in which the ball around the object has the radius 1. Every ray of the picture is sampled
+from where it may meet that ball to where it leaves it; no sample is left out, be it empty or hidden.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, astuple, dataclass
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+import numpy as np
+
+from experiments.paper.rendering import (
+    Column,
+    MadeMethod,
+    Render,
+    RenderingMethod,
+    RenderingWork,
+    Sense,
+    picture_scores,
+    stored_graph,
+)
+from harness.authoring.vision.data import HeldOutViews, held_out_pictures
+from harness.authoring.vision.metrics import BEHIND, reference_pictures
+from harness.authoring.vision.profiles import CellsSpec, vision_profile
+from harness.authoring.vision.vision import networks_alone
+from harness.basics.arrays import AnyArray, ByteArray, FloatArray
+from harness.basics.errors import DataRefused
+from harness.basics.mesh import Mesh
+from harness.basics.store import digest
+from harness.objectfile.file import ObjectFile
+from harness.objectfile.published.camera import FOCAL, SIZE
+from harness.objectfile.published.look import OsfNetwork, osf_tensors
+from harness.objectfile.published.volume_render import render_rays, stretched_sigmoid
+from harness.objectfile.runtime import Network
+from harness.objectfile.vision.graph import vision_graph
+from harness.objectfile.vision.network import PAPER
+from harness.objectfile.vision.render import RenderSettings, VisionRenderer, open_vision
+from harness.objects.builtin import BUILTIN
+from harness.picture.linear_image import LinearImage
+from harness.picture.pinhole import DirectionalLight, Pinhole
+from harness.sim.light.appearance_source import appearance_of
+from harness.sim.light.direct_image import LitObject
+
+KILO_OSF: Final = CellsSpec(PAPER, places=1_500_000, steps=600)
+"""2.0's VisionNet: the published size and inputs, 16^3 cells."""
+
+
+@dataclass(frozen=True)
+class FieldSpec:
+    """One network for the look of an object, and its training by Adam.
+
+    Attributes:
+        depth: hidden layers of the trunk.
+        width: of each.
+        octaves: of the place's encoding.
+        turns: octaves of the view's and the light's.
+        samples: of a ray.
+        places: beside the surface that are learned from.
+        steps: of Adam; its rate falls to zero as half a cosine.
+        batch: places in a step, and half as many of the whole ball.
+        rate: of the first steps.
+        opacity: weight of the density's error beside the colour's.
+    """
+
+    depth: int = 4
+    width: int = 128
+    octaves: int = 7
+    turns: int = 4
+    samples: int = 128
+    places: int = 1_000_000
+    steps: int = 800
+    batch: int = 8192
+    rate: float = 3e-3
+    opacity: float = 0.05
+
+
+FIELD: Final = FieldSpec()
+"""1.0's VisionNet: 4 layers of 128 for its two times 8 of 256, 128 samples for its 64 and 192."""
+
+DISTANCE = float(0.5 / np.sin(np.arctan(0.5 * SIZE / FOCAL)))
+"""Diagonals of the object's box, at which the ball around it fills the view of the paper's camera."""
+
+SAMPLES = 8
+"""A side of a pixel, of the reference: its own noise is then below 1e-3 of white."""
+
+
+@dataclass(frozen=True, eq=False)
+class ViewBench:
+    """Pictures of 256 x 256 pixels before white, as shown on a screen.
+
+    Attributes:
+        lit: the object with its colours.
+        views: cameras and lights, none of which is learned from.
+        references: one a view.
+    """
+
+    lit: LitObject
+    views: HeldOutViews
+    references: tuple[ByteArray, ...]
+
+    sense: Sense = "vision"
+
+    @property
+    def count(self) -> int:
+        """Views."""
+        return len(self.references)
+
+    @cached_property
+    def identity(self) -> str:
+        """Of the reference's pictures and where they were taken."""
+        eyes = [[camera.eye, light.direction] for camera, light in self._pairs]
+        return digest([*eyes, *self.references])
+
+    @property
+    def _pairs(self) -> "zip[tuple[Pinhole, DirectionalLight]]":
+        return zip(self.views.cameras, self.views.lights, strict=True)
+
+    def scores(self, number: int, rendered: AnyArray) -> Mapping[str, float]:
+        """PSNR and SSIM of the whole picture."""
+        return picture_scores(rendered, self.references[number])
+
+
+def shown(image: LinearImage) -> ByteArray:
+    """``(rows, columns, 3)`` before white, in sRGB."""
+    return image.display(BEHIND)
+
+
+def view_bench(of: ObjectFile, views: int, work: RenderingWork) -> ViewBench:
+    """The views of an object.
+
+    Raises:
+        DataRefused: its colours are not known here: it was not built in.
+    """
+    work.report("vision: drawing the reference", 0.0)
+    lit = LitObject(appearance_of(origin_of(of), None, edge=_edge(of)))
+    held_out = held_out_pictures(lit.appearance.mesh, views, SIZE, SIZE, _seed(of), DISTANCE)
+    key = digest(["rendering reference", SAMPLES, lit.appearance.mesh.vertices, views, _seed(of)])
+    stored = work.store.get(key)
+    if not isinstance(stored, np.ndarray):
+        stored = np.stack([shown(each) for each in reference_pictures(lit, held_out, SAMPLES)])
+        work.store.put(key, stored)
+    return ViewBench(lit, held_out, tuple(stored))
+
+
+def origin_of(of: ObjectFile) -> str:
+    """``builtin:NAME``, where an object's colours come from.
+
+    Raises:
+        DataRefused: they come from a file, which an ObjectFile does not hold.
+    """
+    origins = [source.origin for source in of.description.provenance.sources]
+    found = [origin for origin in origins if origin.startswith(BUILTIN)]
+    if not found:
+        raise DataRefused(
+            f"{of.description.name} came from {', '.join(origins) or 'nowhere'}, whose colours its "
+            "ObjectFile does not hold, so that no reference can be drawn; take one that is built in, as mug"
+        )
+    return found[0]
+
+
+def _edge(of: ObjectFile) -> float:
+    """M between vertices of the look's mesh, as the object was built."""
+    vision = of.description.vision
+    profile = None if vision is None else vision.provenance.settings.get("profile")
+    return vision_profile(str(profile or "shipped")).edge
+
+
+def _seed(of: ObjectFile) -> int:
+    """Of the views: those that the ObjectFile's own networks did not learn from."""
+    vision = of.description.vision
+    return 0 if vision is None else vision.provenance.seeds.get("vision", 0)
+
+
+FIELD_FILE = "vision_field.onnx"
+REACH = 4.0
+"""Radii of the ball, that samples lie within."""
+
+RawField = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+"""``(n, 3)`` points and views and a ``(3,)`` light to ``(n, 4)`` raw red, green, blue and density."""
+
+
+@dataclass(frozen=True, eq=False)
+class UniformField:
+    """The trained network, ready for pictures.
+
+    Attributes:
+        field: of places in the frame of the ball.
+        middle: ``(3,)`` m, of the ball.
+        radius: m.
+        samples: of a ray.
+    """
+
+    field: RawField
+    middle: FloatArray
+    radius: float
+    samples: int
+
+    def picture(self, camera: Pinhole, light: DirectionalLight) -> ByteArray:
+        """``(rows, columns, 3)`` before white."""
+        directions = camera.directions().reshape(-1, 3)
+        eye = (camera.eye - self.middle) / self.radius
+        away = float(np.linalg.norm(eye))
+
+        def shown(points: FloatArray, views: FloatArray) -> tuple[FloatArray, FloatArray]:
+            raw = self.field(points, views, light.direction)
+            # Nothing was learned outside of the ball, and the object lies within it.
+            density = np.where(np.linalg.norm(points, axis=-1) <= 1.0, raw[:, 3], 0.0)
+            return density, stretched_sigmoid(raw[:, :3])
+
+        depths = np.linspace(away - 1.0, away + 1.0, self.samples)
+        colour, cover = render_rays(shown, eye, directions, depths)
+        white = colour + (1.0 - cover)[:, None]
+        grey = np.rint(255.0 * np.clip(white, 0.0, 1.0)).astype(np.uint8)
+        return grey.reshape(camera.height, camera.width, 3)
+
+
+def ball_of(mesh: Mesh) -> tuple[FloatArray, float]:
+    """``(3,)`` m and m: middle and radius of the ball around an object's box."""
+    return mesh.bounds.mean(axis=0), 0.5 * mesh.diagonal
+
+
+def opened_field(data: bytes, mesh: Mesh, samples: int) -> UniformField:
+    """The network of a graph, ready for pictures of an object."""
+    inputs, outputs = osf_tensors(REACH)
+    return UniformField(OsfNetwork(Network(data, FIELD_FILE, inputs, outputs)).raw, *ball_of(mesh), samples)
+
+
+_SEED = 0
+
+_SETTINGS: tuple[tuple[str, Column, RenderSettings], ...] = (
+    ("coverage at pixel centres", "ours, smallest", RenderSettings(coverage=1)),
+    ("default", "ours", RenderSettings()),
+    ("four rays a pixel", "ours, largest", RenderSettings(rays=2)),
+)
+
+
+def look_methods(bench: ViewBench, of: ObjectFile, work: RenderingWork) -> list[RenderingMethod]:
+    """Every row of vision.
+
+    Args:
+        bench: of the views.
+        of: the object; its own networks are rows where it has some.
+        work: where networks are stored.
+    """
+    return [
+        RenderingMethod("white alone", "other", (), _white, "costs nothing"),
+        RenderingMethod(
+            "one field, samples evenly (1.0)",
+            "1.0 here",
+            ("within the ball", *astuple(FIELD)),
+            lambda: _by_field(bench, work),
+            f"{FIELD.samples} samples a ray, {FIELD.depth} x {FIELD.width}",
+        ),
+        RenderingMethod(
+            "KiloOSF (2.0)",
+            "2.0 here",
+            (asdict(KILO_OSF.size), *astuple(KILO_OSF)[1:]),
+            lambda: _by_cells(bench, work),
+            f"its networks and inputs, {KILO_OSF.steps} steps each, in our renderer",
+        ),
+        *_own(bench, of),
+        RenderingMethod(
+            "the mesh itself, 2 x 2 rays a pixel",
+            "other",
+            (),
+            lambda: _by_mesh(bench),
+            "as the reference, with fewer rays",
+        ),
+    ]  # fmt: skip
+
+
+def _white() -> MadeMethod:
+    return MadeMethod(lambda _: np.full((SIZE, SIZE, 3), 255, np.uint8))
+
+
+def _by_field(bench: ViewBench, work: RenderingWork) -> MadeMethod:
+    def train() -> bytes:
+        from experiments.paper.rendering_training import train_field
+
+        return train_field(bench, FIELD, work.report)
+
+    identity = ("field", bench.identity, astuple(FIELD))
+    data, seconds = stored_graph(work.store, identity, "the field of 1.0", train)
+    field = opened_field(data, bench.lit.appearance.mesh, FIELD.samples)
+
+    def observe(number: int) -> AnyArray:
+        return field.picture(bench.views.cameras[number], bench.views.lights[number])
+
+    return MadeMethod(observe, seconds)
+
+
+def _by_cells(bench: ViewBench, work: RenderingWork) -> MadeMethod:
+    def train() -> bytes:
+        with TemporaryDirectory() as folder:
+            checkpoint = Path(folder) / "cells.npz"
+            model = networks_alone(bench.lit, bench.views, KILO_OSF, _SEED, checkpoint, work.report, 1)
+        return vision_graph(model).SerializeToString()
+
+    identity = ("kilo osf", bench.identity, asdict(KILO_OSF.size), *astuple(KILO_OSF)[1:])
+    data, seconds = stored_graph(work.store, identity, "KiloOSF", train, torch=False)
+    renderer = VisionRenderer(data, bench.lit.appearance.mesh, 1)
+    return MadeMethod(_pictures(bench, renderer, RenderSettings()), seconds)
+
+
+def _own(bench: ViewBench, of: ObjectFile) -> list[RenderingMethod]:
+    entry = of.description.vision
+    if entry is None:
+        return []
+    rows = []
+    for name, column, settings in _SETTINGS:
+
+        def make(settings: RenderSettings = settings) -> MadeMethod:
+            return MadeMethod(_pictures(bench, open_vision(of, 1).renderer, settings))
+
+        identity = (entry.network.sha256, asdict(settings))
+        rows.append(RenderingMethod(f"networks of the ObjectFile, {name}", column, identity, make))
+    return rows
+
+
+def _pictures(bench: ViewBench, renderer: VisionRenderer, settings: RenderSettings) -> Render:
+    def observe(number: int) -> AnyArray:
+        camera, light = bench.views.cameras[number], bench.views.lights[number]
+        return shown(renderer.render(camera, light, settings).image)
+
+    return observe
+
+
+def _by_mesh(bench: ViewBench) -> MadeMethod:
+    def observe(number: int) -> AnyArray:
+        camera, light = bench.views.cameras[number], bench.views.lights[number]
+        return shown(bench.lit.render(camera, [light], 2).image)
+
+    return MadeMethod(observe)

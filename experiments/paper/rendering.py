@@ -1,0 +1,303 @@
+"""Quality and seconds of every method of a sense; what was measured is stored and not measured again.
+
+A bench holds the queries of one sense and their reference; a method renders them. Networks and cells are kept
+in a store by all that they depend on.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Literal, Protocol
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from harness.authoring.training import Report
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.store import Store, digest
+from harness.picture.image_metrics import mean_square, ssim
+
+Sense = Literal["vision", "audio", "touch"]
+SENSES: tuple[Sense, ...] = ("vision", "audio", "touch")
+
+Column = Literal["1.0 here", "2.0 here", "ours, smallest", "ours", "ours, largest", "other"]
+COLUMNS: tuple[Column, ...] = ("1.0 here", "2.0 here", "ours, smallest", "ours", "ours, largest")
+"""Rows of tables 1 and 2 that are measured; ``"other"`` stands in a sense's own table alone."""
+
+Render = Callable[[int], AnyArray]
+"""From a query's number to what is rendered for it: a sound, or a picture of 8 bits."""
+
+ROUNDING = 1.0 / 12.0
+"""Squared grey levels: pictures of whole greys are known no better, so that no PSNR is above 58.9 dB."""
+
+PEAK = 255.0
+
+
+class RenderingBench(Protocol):
+    """The queries of one sense with their reference."""
+
+    @property
+    def sense(self) -> Sense:
+        """Of the queries."""
+
+    @property
+    def identity(self) -> str:
+        """A digest of the object, the queries and the reference."""
+
+    @property
+    def count(self) -> int:
+        """Queries."""
+
+    def scores(self, number: int, rendered: AnyArray) -> Mapping[str, float]:
+        """The paper's metrics of what was rendered for one query."""
+
+
+@dataclass(frozen=True, eq=False)
+class MadeMethod:
+    """A method ready to render.
+
+    Attributes:
+        render: renders one query.
+        seconds: CPU s of fitting or training; 0 where nothing was made here.
+    """
+
+    render: Render
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class RenderingMethod:
+    """One way from a query to an observation.
+
+    Attributes:
+        name: of its row.
+        column: the row of tables 1 and 2 that it fills.
+        identity: of all that it depends on beside the bench; a digest takes it.
+        make: fits, trains or opens it; raises ``TorchMissing`` where it cannot be trained.
+        note: what a reader has to know of it.
+    """
+
+    name: str
+    column: Column
+    identity: tuple[object, ...]
+    make: Callable[[], MadeMethod]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class RenderingWork:
+    """Where results lie and who is informed.
+
+    Attributes:
+        store: of reference solutions, networks and measured cells.
+        report: takes what is being done and the share of it that is done.
+    """
+
+    store: Store
+    report: Report
+
+
+def picture_scores(rendered: AnyArray, reference: AnyArray) -> dict[str, float]:
+    """PSNR in dB and SSIM of two ``(rows, columns, 3)`` pictures of 8 bits, over whole pictures."""
+    error = max(mean_square(rendered, reference), ROUNDING)
+    return {"psnr_db": float(10.0 * np.log10(PEAK**2 / error)), "ssim": ssim(rendered, reference)}
+
+
+@dataclass(frozen=True)
+class FitSpec:
+    """A perceptron and its training by Adam.
+
+    Attributes:
+        depth: hidden layers.
+        width: of each.
+        octaves: of the encoding.
+        steps: of Adam; its rate falls to zero as half a cosine.
+        batch: rows in a step.
+        rate: of the first steps.
+    """
+
+    depth: int = 4
+    width: int = 256
+    octaves: int = 10
+    steps: int = 300
+    batch: int = 8192
+    rate: float = 2e-3
+
+
+GRAPH_VERSION = "baseline graph"
+"""Of what trainings compute; another text with every change of it, so that stored networks are dropped."""
+
+
+class TorchMissing(Exception):
+    """A baseline has to be trained, and torch is not installed; its row of the table says so."""
+
+
+def require_torch(what: str) -> None:
+    """Raise ``TorchMissing`` where torch is not installed."""
+    if any(find_spec(name) is None for name in ("torch", "onnxscript")):
+        raise TorchMissing(f"{what} has to be trained, which needs torch: pip install '.[author]'")
+
+
+def stored_graph(
+    store: Store, identity: tuple[object, ...], what: str, train: Callable[[], bytes], torch: bool = True
+) -> tuple[bytes, float]:
+    """The graph of a network from the store, or trained now and put there.
+
+    Args:
+        store: of graphs.
+        identity: of all that the network depends on.
+        what: the network is called in messages.
+        train: gives the graph's bytes.
+        torch: whether training needs it.
+
+    Returns:
+        The bytes, and the CPU s that training took, then or now.
+
+    Raises:
+        TorchMissing: it has to be trained and cannot be.
+    """
+    key = digest([GRAPH_VERSION, *identity])
+    stored = store.get(key)
+    if isinstance(stored, Mapping):
+        return stored["graph"].tobytes(), float(stored["seconds"])
+    if torch:
+        require_torch(what)
+    begun = time.process_time()
+    data = train()
+    seconds = time.process_time() - begun
+    store.put(key, {"graph": np.frombuffer(data, np.uint8), "seconds": np.array(seconds)})
+    return data, seconds
+
+
+VERSION = 1
+"""Raised with every change of how cells are measured, so that stored ones are dropped."""
+
+ROUNDS = 15
+"""Of timing: in each, every method renders one query."""
+
+_ENOUGH = 8.0
+"""CPU s of one method's timing after which it takes no part in further rounds."""
+
+_LEAST_ROUNDS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredMethod:
+    """A method with its worth.
+
+    Attributes:
+        method: that was measured.
+        scores: ``(n,)`` of each metric; empty where it could not be made.
+        seconds: ``(k,)`` CPU s of one thread, of one observation each; empty likewise.
+        made: CPU s of fitting or training.
+        missing: why it could not be made; empty where it was.
+    """
+
+    method: RenderingMethod
+    scores: Mapping[str, FloatArray]
+    seconds: FloatArray
+    made: float = 0.0
+    missing: str = ""
+
+
+class _Workshop:
+    """Methods made when they are first used."""
+
+    def __init__(self) -> None:
+        self._made: dict[str, MadeMethod] = {}
+
+    def made(self, method: RenderingMethod) -> MadeMethod:
+        if method.name not in self._made:
+            self._made[method.name] = method.make()
+        return self._made[method.name]
+
+
+def measure_sense(
+    bench: RenderingBench, methods: Sequence[RenderingMethod], work: RenderingWork
+) -> Iterator[MeasuredMethod]:
+    """Every method of a sense, each cell stored as soon as it is measured.
+
+    Quality is a cell a method. Seconds are one cell of all methods, which render in turn, so that what else
+    the machine does meets them alike.
+
+    Args:
+        bench: of the sense.
+        methods: with names that differ.
+        work: where cells are stored.
+    """
+    workshop, worth = _Workshop(), {}
+    missing: dict[str, str] = {}
+    with threadpool_limits(limits=1):
+        for number, method in enumerate(methods):
+            work.report(f"{bench.sense}: {method.name}", number / len(methods))
+            try:
+                worth[method.name] = _quality(bench, method, workshop, work)
+            except TorchMissing as reason:
+                missing[method.name] = str(reason)
+        work.report(f"{bench.sense}: seconds", 1.0)
+        timed = _timing(bench, [each for each in methods if each.name in worth], workshop, work)
+    for method in methods:
+        if method.name in missing:
+            yield MeasuredMethod(method, {}, np.empty(0), missing=missing[method.name])
+        else:
+            scores = dict(worth[method.name])
+            made = float(scores.pop("made_s"))
+            yield MeasuredMethod(method, scores, timed[method.name], made)
+
+
+def _quality(
+    bench: RenderingBench, method: RenderingMethod, workshop: _Workshop, work: RenderingWork
+) -> Mapping[str, FloatArray]:
+    """``(n,)`` of each metric, and ``made_s``."""
+    key = digest(["rendering quality", VERSION, bench.identity, method.name, list(method.identity)])
+    stored = work.store.get(key)
+    if isinstance(stored, Mapping):
+        return stored
+    made = workshop.made(method)
+    rows = [bench.scores(number, made.render(number)) for number in range(bench.count)]
+    found = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    found["made_s"] = np.array(made.seconds)
+    work.store.put(key, found)
+    return found
+
+
+def _timing(
+    bench: RenderingBench, methods: Sequence[RenderingMethod], workshop: _Workshop, work: RenderingWork
+) -> Mapping[str, FloatArray]:
+    """``(k,)`` CPU s of each method, by its name."""
+    every = [[method.name, list(method.identity)] for method in methods]
+    key = digest(["rendering seconds", VERSION, bench.identity, every])
+    stored = work.store.get(key)
+    if isinstance(stored, Mapping):
+        return {name.removeprefix("of "): seconds for name, seconds in stored.items()}
+    made = {method.name: workshop.made(method) for method in methods}
+    taken = timed_in_turn(made, bench.count)
+    work.store.put(key, {f"of {name}": seconds for name, seconds in taken.items()})
+    return taken
+
+
+def timed_in_turn(made: Mapping[str, MadeMethod], count: int, rounds: int = ROUNDS) -> dict[str, FloatArray]:
+    """``(k,)`` CPU s of each: in every round each renders one query, and a slow one in fewer rounds.
+
+    Args:
+        made: by name.
+        count: of queries; rounds take them one after the other.
+        rounds: at most.
+    """
+    taken: dict[str, list[float]] = {name: [] for name in made}
+    for name, method in made.items():
+        first = _seconds(method, 0)
+        # What is slow has warmed up long before its first observation ends.
+        taken[name] += [first] if first > 1.0 else []
+    for number in range(rounds):
+        for name, method in made.items():
+            if len(taken[name]) < _LEAST_ROUNDS or sum(taken[name]) < _ENOUGH:
+                taken[name].append(_seconds(method, number % count))
+    return {name: np.array(seconds) for name, seconds in taken.items()}
+
+
+def _seconds(made: MadeMethod, number: int) -> float:
+    begun = time.process_time()
+    made.render(number)
+    return time.process_time() - begun

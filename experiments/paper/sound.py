@@ -1,0 +1,381 @@
+"""Tables 1 and 2 of audio: strikes and their reference, 1.0's two forms, the paper's network, ours.
+
+1.0's network predicts the short-time spectrum of a strike, bin by bin, in the published form: 16 kHz, two
+seconds, Hann windows of 400 samples padded to 512 every 160 samples; five inputs, the place, the frequency
+and the time, each 0 to 1, and real and imaginary part for unit forces along x, y and z. What lies above 8 kHz
+or behind two seconds cannot be in it.
+"""
+
+import time
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from scipy.signal import ShortTimeFFT, get_window, resample_poly
+
+from experiments.paper.hexahedra import CELLS, hexahedral_modes
+from experiments.paper.rendering import (
+    Column,
+    FitSpec,
+    MadeMethod,
+    Render,
+    RenderingMethod,
+    RenderingWork,
+    Sense,
+    stored_graph,
+)
+from harness.authoring.audio.audio import opened, waves_graph
+from harness.authoring.audio.data import SoundSamples, Split, canonical, split_nodes, wave_number
+from harness.authoring.audio.metrics import DURATION, RATE, sound_distances
+from harness.authoring.audio.object_audio import MODES
+from harness.authoring.audio.profiles import PROFILES, PerceptronSpec, WavesSpec
+from harness.authoring.audio.waves import fit_enough_waves
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.errors import MeshRefused
+from harness.basics.materials import Material
+from harness.basics.mesh import Mesh
+from harness.basics.store import digest
+from harness.objectfile.audio.part import NETWORK, network_tensors
+from harness.objectfile.entries import Domain, Input, Tensor
+from harness.objectfile.runtime import Network
+from harness.objectfile.vision_tensors import graph_input
+from harness.sim.modal.modal import HEARING, default_edge, solved_once
+from harness.sim.modal.modes import Modes, dampings
+from harness.sim.sound.modal_sound import audible
+from harness.sim.sound.synthesis import SynthesisLevel, synthesize
+
+SPECTROGRAM: Final = FitSpec(steps=320)
+"""1.0's AudioNet: 4 layers of 256 for its 3 x 8."""
+
+AUDIONET: Final = PerceptronSpec(epochs=12)
+"""2.0's, with the published layers."""
+
+STRIKE_SEED = 0
+"""Of the split, and of first weights."""
+
+
+@dataclass(frozen=True, eq=False)
+class StrikeBench:
+    """Unit impulses along the normal at held-out nodes.
+
+    Attributes:
+        mesh: of the object.
+        material: of all of it.
+        modes: of the reference, quadratic tetrahedra, canonical.
+        split: of its surface's nodes.
+        nodes: ``(n,)`` held-out nodes that are struck.
+    """
+
+    mesh: Mesh
+    material: Material
+    modes: Modes
+    split: Split
+    nodes: AnyArray
+
+    sense: Sense = "audio"
+
+    @property
+    def count(self) -> int:
+        """Strikes."""
+        return len(self.nodes)
+
+    @cached_property
+    def identity(self) -> str:
+        """Of the reference and of the strikes."""
+        return digest([self.lesson, self.rates, self.nodes])
+
+    @cached_property
+    def lesson(self) -> str:
+        """Of all that networks learn from."""
+        modes = self.modes
+        return digest([modes.points, modes.shapes, modes.frequencies, self.rates, self.split.trained])
+
+    @cached_property
+    def rates(self) -> FloatArray:
+        """``(m,)`` 1/s: dampings of the reference's modes."""
+        return dampings(self.modes.frequencies, self.material)
+
+    def strike(self, number: int) -> tuple[FloatArray, FloatArray]:
+        """``(3,)`` m and ``(3,)`` unit: place and normal of a strike."""
+        node = self.nodes[number]
+        return self.modes.points[node], self.modes.normals[node]
+
+    def reference(self, number: int) -> FloatArray:
+        """``(t,)`` the exact sum of the reference's modes."""
+        node = self.nodes[number]
+        gains = self.modes.shapes[node] @ self.modes.normals[node]
+        return summed(self.modes.frequencies, self.rates, gains, "double")
+
+    def scores(self, number: int, rendered: AnyArray) -> Mapping[str, float]:
+        """STFT distance and envelope distance."""
+        found = sound_distances(rendered, self.reference(number))
+        return {"stft_distance": found.stft, "envelope_distance": found.envelope}
+
+
+def summed(
+    frequencies: FloatArray, rates: FloatArray, gains: AnyArray, level: SynthesisLevel = "fast"
+) -> FloatArray:
+    """``(t,)``: the sound of ``(m,)`` gains, as long and at the rate that distances are defined for."""
+    made = synthesize(frequencies, rates, np.asarray(gains)[None], DURATION, RATE, level)
+    sound: FloatArray = made.sound[0]
+    return sound
+
+
+def strike_bench(mesh: Mesh, material: Material, strikes: int, work: RenderingWork) -> StrikeBench:
+    """The strikes of an object; its modes are solved once.
+
+    Raises:
+        MeshRefused: a surface that cannot be filled or solved, or without a mode in hearing.
+    """
+    work.report("audio: solving the reference's elements", 0.0)
+    edge = default_edge(mesh, material, HEARING, MODES)
+    modes = canonical(solved_once(mesh, material, HEARING, edge, MODES, work.store)[0])
+    if len(modes.frequencies) == 0:
+        raise MeshRefused(
+            f"the object has no mode up to {HEARING:g} Hz, so it has no sound; take another object"
+        )
+    split = split_nodes(len(modes.points), seed=STRIKE_SEED)
+    chosen = np.linspace(0, len(split.held_out) - 1, min(strikes, len(split.held_out))).astype(np.int64)
+    return StrikeBench(mesh, material, modes, split, split.held_out[chosen])
+
+
+SPECTRUM_RATE = 16e3
+SECONDS = 2.0
+_WINDOW, _HOP, _POINTS = 400, 160, 512
+_UP, _DOWN = 441, 160
+"""From 16 kHz to 44.1 kHz."""
+
+_AT_ONCE = 16384
+SPECTRUM_INPUTS = 5
+SPECTRUM_OUTPUTS = 6
+"""Real parts for x, y, z, then imaginary parts."""
+
+SPECTRUM_FILE = "audio_spectrum.onnx"
+
+
+@dataclass(frozen=True, eq=False)
+class SpectrumBasis:
+    """Short-time spectra of single modes: that of a strike is their sum, each times its gain.
+
+    Attributes:
+        spectra: ``(m, f, t)`` complex64, of each mode below 8 kHz with a gain of 1.
+        modes: ``(m,)`` which modes of the object these are.
+    """
+
+    spectra: AnyArray
+    modes: AnyArray
+
+    @classmethod
+    def of(cls, bench: StrikeBench) -> "SpectrumBasis":
+        """Of the reference's modes."""
+        below = np.flatnonzero(audible(bench.modes.frequencies, SPECTRUM_RATE))
+        frequencies, rates = bench.modes.frequencies[below], bench.rates[below]
+        gains = np.eye(len(below))
+        sounds = synthesize(frequencies, rates, gains, SECONDS, SPECTRUM_RATE, "double").sound
+        return cls(np.stack([transform().stft(each) for each in sounds]).astype(np.complex64), below)
+
+    @property
+    def bins(self) -> tuple[int, int]:
+        """Frequencies and frames."""
+        return self.spectra.shape[1], self.spectra.shape[2]
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """``(f t, 2)``: frequency and time of each bin, 0 to 1."""
+        rows, columns = (np.linspace(0.0, 1.0, size) for size in self.bins)
+        return np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1).reshape(-1, 2)
+
+    def spectrum(self, gains: AnyArray) -> AnyArray:
+        """``(f, t)`` complex: of ``(m,)`` gains of the modes that are in it."""
+        return np.tensordot(gains, self.spectra, axes=1)
+
+
+def transform() -> ShortTimeFFT:
+    """The short-time transform of version 1.0."""
+    return ShortTimeFFT(get_window("hann", _WINDOW), _HOP, SPECTRUM_RATE, mfft=_POINTS)
+
+
+def sound_of_spectrum(spectrum: AnyArray) -> FloatArray:
+    """``(t,)``: the sound of an ``(f, t)`` spectrum at 44.1 kHz, with silence behind its end."""
+    sound = transform().istft(spectrum, k1=round(SECONDS * SPECTRUM_RATE))
+    faster = np.asarray(resample_poly(np.asarray(sound, np.float64), _UP, _DOWN))
+    return np.pad(faster, (0, round(DURATION * RATE) - len(faster)))
+
+
+@dataclass(frozen=True, eq=False)
+class SpectrumNetwork:
+    """The trained network, ready to be queried.
+
+    Attributes:
+        network: five numbers of a bin to six.
+        low: ``(3,)`` m, of the box in which places are 0 to 1.
+        high: ``(3,)`` m.
+        basis: gives the bins.
+    """
+
+    network: Network
+    low: FloatArray
+    high: FloatArray
+    basis: SpectrumBasis
+
+    def sound(self, point: FloatArray, normal: FloatArray) -> FloatArray:
+        """``(t,)``: what a unit impulse along ``(3,)`` a normal at ``(3,)`` a place sounds like."""
+        rows = np.empty((len(self.basis.places), SPECTRUM_INPUTS))
+        rows[:, :3], rows[:, 3:] = (point - self.low) / (self.high - self.low), self.basis.places
+        runs = [
+            self.network({"place": rows[k : k + _AT_ONCE]})["spectrum"] for k in range(0, len(rows), _AT_ONCE)
+        ]
+        values = np.concatenate(runs).astype(np.float64)
+        along = values[:, :3] @ normal + 1j * (values[:, 3:] @ normal)
+        return sound_of_spectrum(along.reshape(self.basis.bins))
+
+
+def spectrum_pair() -> tuple[Input, Tensor]:
+    """What the network takes and gives."""
+    box = Domain(low=(0.0,) * SPECTRUM_INPUTS, high=(1.0,) * SPECTRUM_INPUTS)
+    place = graph_input(
+        "place", "float64", ("n", SPECTRUM_INPUTS), "1", "x y z, frequency, time: 0 to 1", box
+    )
+    spectrum = Tensor(
+        name="spectrum",
+        dtype="float32",
+        shape=("n", SPECTRUM_OUTPUTS),
+        unit="s/sqrt(kg)",
+        meaning="real parts for unit forces along x, y, z, then imaginary ones",
+    )
+    return place, spectrum
+
+
+_ANYWHERE = 1.0
+"""m: a network that belongs to no object yet does not limit how near to a surface a point is."""
+
+_PROFILES: tuple[tuple[str, Column], ...] = (
+    ("smoke", "ours, smallest"),
+    ("shipped", "ours"),
+    ("standard", "ours, largest"),
+)
+
+
+def sound_methods(bench: StrikeBench, work: RenderingWork) -> list[RenderingMethod]:
+    """Every row of sound.
+
+    Args:
+        bench: of the strikes.
+        work: where networks are stored.
+    """
+    ours = [_profile(bench, name, column) for name, column in _PROFILES]
+    return [
+        RenderingMethod("silence", "other", (), lambda: _silence(bench), "costs nothing"),
+        RenderingMethod(
+            "spectrogram AudioNet (1.0)",
+            "1.0 here",
+            astuple(SPECTROGRAM),
+            lambda: _by_spectrogram(bench, work),
+            "16 kHz and 2 s, as published",
+        ),
+        RenderingMethod(
+            "exact spectrogram, no network",
+            "other",
+            (),
+            lambda: _exact_spectrogram(bench),
+            "the least that 1.0's form can be off by",
+        ),
+        RenderingMethod(
+            "exact gains of hexahedra (1.0)",
+            "other",
+            (CELLS,),
+            lambda: _by_hexahedra(bench),
+            f"{CELLS} cubes along the longest side",
+        ),
+        RenderingMethod(
+            "AudioNet (2.0)",
+            "2.0 here",
+            astuple(AUDIONET),
+            lambda: _by_audionet(bench, work),
+            f"its layers; trained here for {AUDIONET.epochs} epochs, last layer solved",
+        ),
+        *ours,
+    ]
+
+
+def _profile(bench: StrikeBench, name: str, column: Column) -> RenderingMethod:
+    spec = PROFILES[name].network
+    assert isinstance(spec, WavesSpec)
+    row = f"modes, gains by waves, profile {name}"
+    return RenderingMethod(row, column, astuple(spec), lambda: _by_waves(bench, spec))
+
+
+def _silence(bench: StrikeBench) -> MadeMethod:
+    samples = len(bench.reference(0))
+    return MadeMethod(lambda _: np.zeros(samples))
+
+
+def _by_waves(bench: StrikeBench, spec: WavesSpec) -> MadeMethod:
+    modes, begun = bench.modes, time.process_time()
+    trained = bench.split.trained
+    nodes = SoundSamples(modes.points[trained], modes.shapes[trained])
+    fit = fit_enough_waves(nodes, np.arange(len(trained)), wave_number(modes), spec, STRIKE_SEED)
+    network = opened(waves_graph(fit.network, spec.storage), len(modes.frequencies))
+    return MadeMethod(_by_gains(bench, network), time.process_time() - begun)
+
+
+def _by_audionet(bench: StrikeBench, work: RenderingWork) -> MadeMethod:
+    def train() -> bytes:
+        from experiments.paper.rendering_training import train_audionet
+
+        return train_audionet(bench, AUDIONET, work.report)
+
+    identity = ("audionet", bench.lesson, astuple(AUDIONET))
+    data, seconds = stored_graph(work.store, identity, "AudioNet", train)
+    points, gains = network_tensors(len(bench.modes.frequencies), _ANYWHERE)
+    return MadeMethod(_by_gains(bench, Network(data, NETWORK, [points], [gains])), seconds)
+
+
+def _by_gains(bench: StrikeBench, network: Network) -> Render:
+    def observe(number: int) -> AnyArray:
+        point, normal = bench.strike(number)
+        gains = network({"points": point[None]})["gains"][0].astype(np.float64) @ normal
+        return summed(bench.modes.frequencies, bench.rates, gains)
+
+    return observe
+
+
+def _by_spectrogram(bench: StrikeBench, work: RenderingWork) -> MadeMethod:
+    def train() -> bytes:
+        from experiments.paper.rendering_training import train_spectrogram
+
+        return train_spectrogram(bench, SPECTROGRAM, work.report)
+
+    identity = ("spectrogram", bench.lesson, astuple(SPECTROGRAM))
+    data, seconds = stored_graph(work.store, identity, "the spectrogram network", train)
+    place, spectrum = spectrum_pair()
+    low, high = bench.mesh.bounds
+    network = SpectrumNetwork(
+        Network(data, SPECTRUM_FILE, [place], [spectrum]), low, high, SpectrumBasis.of(bench)
+    )
+    return MadeMethod(lambda number: network.sound(*bench.strike(number)), seconds)
+
+
+def _exact_spectrogram(bench: StrikeBench) -> MadeMethod:
+    basis = SpectrumBasis.of(bench)
+
+    def observe(number: int) -> AnyArray:
+        node = bench.nodes[number]
+        gains: FloatArray = bench.modes.shapes[node] @ bench.modes.normals[node]
+        return sound_of_spectrum(basis.spectrum(gains[basis.modes]))
+
+    return MadeMethod(observe)
+
+
+def _by_hexahedra(bench: StrikeBench) -> MadeMethod:
+    begun = time.process_time()
+    modes = hexahedral_modes(bench.mesh, bench.material, HEARING, MODES)
+    rates = dampings(modes.frequencies, bench.material)
+
+    def observe(number: int) -> AnyArray:
+        point, normal = bench.strike(number)
+        return summed(modes.frequencies, rates, modes.at(point) @ normal)
+
+    return MadeMethod(observe, time.process_time() - begun)

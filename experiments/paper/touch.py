@@ -1,0 +1,356 @@
+"""Tables 1 and 2 of touch: presses and their reference, 1.0's network, the paper's, ours.
+
+1.0's network goes from a place and a pixel to the colour that the sensor's camera sees. One picture a place,
+pressed along the normal: it knows no tilt, no depth and no gel. 1.0 drew its pictures as a DIGIT's; here they
+are the sensor's of all rows of the table.
+"""
+
+import time
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass
+from functools import cached_property
+from typing import Final, Literal
+
+import numpy as np
+
+from experiments.paper.rendering import (
+    Column,
+    FitSpec,
+    MadeMethod,
+    Render,
+    RenderingMethod,
+    RenderingWork,
+    Sense,
+    picture_scores,
+    stored_graph,
+)
+from harness.authoring.touch.data import (
+    DEPTHS,
+    MOST_TILT,
+    choose_nodes,
+    pressed,
+    reference_maps,
+    smooth_normals,
+)
+from harness.authoring.touch.metrics import PressBench
+from harness.authoring.touch.profiles import TOUCH_PROFILES, CodesSpec, TouchPerceptronSpec
+from harness.authoring.touch.touch import opened_codes, spaced_codes
+from harness.basics.arrays import AnyArray, ByteArray, FloatArray
+from harness.basics.errors import OutOfDomain
+from harness.basics.mesh import Mesh
+from harness.basics.store import digest
+from harness.bench.sensor import GELSIGHT_R15
+from harness.effects.touch_drawing import optics
+from harness.objectfile.entries import Domain, Input, Tensor
+from harness.objectfile.file import ObjectFile
+from harness.objectfile.runtime import Network
+from harness.objectfile.surface_search import SurfaceSearch
+from harness.objectfile.touch.graph import codes_graph
+from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes
+from harness.objectfile.touch.part import PERCEPTRON, perceptron_tensors
+from harness.objectfile.touch.perceptron import pixel_domain
+from harness.objectfile.touch.touch import Maps, PerceptronMaps, ReferenceMaps, open_touch
+from harness.objectfile.touch_entries import GelEntry
+from harness.objectfile.vision_tensors import graph_input
+from harness.sim.gel.height_map import RasterMesh
+from harness.sim.gel.presses import Presses
+from harness.sim.optics.optics import Optics
+from harness.sim.optics.tactile_calibration import TactileCalibration, shipped_calibration
+
+COLOURS: Final = FitSpec(octaves=6, steps=200)
+"""1.0's TouchNet: 4 layers of 256, and 6 octaves for its 10, of which the last are noise between places."""
+
+TOUCHNET: Final = TouchPerceptronSpec(presses=1200, epochs=1, steps=150, rate=2e-3)
+"""2.0's, with the published layers."""
+
+SMALL_CODES: Final = CodesSpec(most_bytes=1_000_000, pitch=0.8e-3)
+"""Ours, smaller than the profile ``smoke``."""
+
+PRESS_SEED = 11
+"""Of places and presses; networks are made with 0."""
+
+SPACING = 5e-3
+"""m between places that networks of the table may learn from."""
+
+NEAR = 6.5e-3
+"""m: a press farther from all of them is left out, as by the codes of that spacing."""
+
+MIDDLE = float(np.mean(DEPTHS))
+"""m: how deep 1.0's one picture of a place is pressed, which knows no other depth."""
+
+Kind = Literal["any", "upright"]
+
+
+@dataclass(frozen=True, eq=False)
+class TouchBench:
+    """Presses of 2.0's range at random places, without yaw, or of 1.0's: upright and equally deep.
+
+    Attributes:
+        places: where networks learn, with the rasteriser.
+        presses: that are possible.
+        maps: ``(n, rows, columns)`` m, of the reference.
+        calibration: of the colours.
+    """
+
+    places: PressBench
+    presses: Presses
+    maps: FloatArray
+    calibration: TactileCalibration
+
+    sense: Sense = "touch"
+
+    @property
+    def count(self) -> int:
+        """Presses."""
+        return len(self.presses)
+
+    @cached_property
+    def identity(self) -> str:
+        """Of the object, the presses and the sensor."""
+        return digest([self.lesson, self.presses.object_from_gel, self.presses.depths, self.maps])
+
+    @cached_property
+    def lesson(self) -> str:
+        """Of all that networks learn from."""
+        places, known = self.places, self.calibration
+        return digest([places.mesh.vertices, places.nodes.points, known.background, known.table])
+
+    @cached_property
+    def optics(self) -> Optics:
+        """From maps to pictures, for the reference and for every map of a method alike."""
+        return optics(self.calibration, "fast", self.places.sensor)
+
+    def picture(self, indentation: AnyArray) -> ByteArray:
+        """``(rows, columns, 3)`` of ``(rows, columns)`` m."""
+        drawn: ByteArray = self.optics.render(np.asarray(indentation, np.float64)[None]).images[0]
+        return drawn
+
+    def scores(self, number: int, rendered: AnyArray) -> Mapping[str, float]:
+        """PSNR and SSIM of the whole picture."""
+        return picture_scores(rendered, self.picture(self.maps[number]))
+
+
+def learning_places(mesh: Mesh, calibration: TactileCalibration) -> PressBench:
+    """Where networks of an object learn."""
+    nodes: SurfaceNodes = choose_nodes(mesh, SPACING)
+    return PressBench(mesh, RasterMesh(mesh), GELSIGHT_R15, calibration.header.skirt, nodes, NEAR)
+
+
+def touch_bench(
+    mesh: Mesh, presses: int, kind: Kind, work: RenderingWork, codes: NodeSearch | None = None
+) -> TouchBench:
+    """The presses of an object.
+
+    Args:
+        mesh: of the object.
+        presses: that are drawn; those that are impossible are left out.
+        kind: of presses.
+        work: is informed.
+        codes: of an ObjectFile that is to answer them too: a press that its codes refuse is left out.
+
+    Raises:
+        OutOfDomain: no press is possible.
+    """
+    work.report("touch: simulating presses", 0.0)
+    calibration = shipped_calibration("gelsight_r15_bench")
+    places = learning_places(mesh, calibration)
+    points = SurfaceSearch(mesh).spread(presses, PRESS_SEED)[0]
+    drawn = _presses(mesh, points, kind)
+    searches = [NodeSearch(places.nodes, NEAR), *([] if codes is None else [codes])]
+    near = np.all([each.nearest(drawn)[1] <= each.most for each in searches], axis=0)
+    reference = reference_maps(places.raster, drawn, places.sensor, places.skirt)
+    chosen = np.flatnonzero(reference.possible & near)
+    if not len(chosen):
+        raise OutOfDomain(f"none of {presses} presses is possible; is the mesh inside out?")
+    return TouchBench(places, drawn[chosen], reference.maps[chosen], calibration)
+
+
+def _presses(mesh: Mesh, points: FloatArray, kind: Kind) -> Presses:
+    normals, nothing = smooth_normals(mesh, points), np.zeros(len(points))
+    if kind == "upright":
+        return Presses(points, normals, nothing + MIDDLE, nothing, nothing, nothing)
+    drawn = pressed(points, normals, PRESS_SEED, DEPTHS, MOST_TILT)
+    return Presses(points, normals, drawn.depths, drawn.tilts, drawn.azimuths, nothing)
+
+
+COLOUR_INPUTS = 5
+CHANNELS = 3
+COLOURS_FILE = "touch_colours.onnx"
+
+
+@dataclass(frozen=True, eq=False)
+class ColourNetwork:
+    """The trained network, ready to be queried.
+
+    Attributes:
+        network: five numbers of a pixel to a colour of -1 .. 1.
+        low: ``(3,)`` m, of the box in which places are 0 to 1.
+        high: ``(3,)`` m.
+        shape: rows and columns of a picture.
+    """
+
+    network: Network
+    low: FloatArray
+    high: FloatArray
+    shape: tuple[int, int]
+
+    def picture(self, point: FloatArray) -> ByteArray:
+        """``(rows, columns, 3)`` of the press at a ``(3,)`` place in m."""
+        place = np.broadcast_to(
+            (point - self.low) / (self.high - self.low), (self.shape[0] * self.shape[1], 3)
+        )
+        rows = np.concatenate([place, pixel_places(self.shape)], axis=1)
+        found = self.network({"place": rows})["colours"]
+        grey = np.clip(np.rint(127.5 * (found + 1.0)), 0.0, 255.0)
+        return grey.astype(np.uint8).reshape(*self.shape, CHANNELS)
+
+
+def pixel_places(shape: tuple[int, int]) -> FloatArray:
+    """``(rows * columns, 2)``: where a pixel is, -1 .. 1, row by row."""
+    rows, columns = (np.linspace(-1.0, 1.0, size) for size in shape)
+    return np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def colours_pair() -> tuple[Input, Tensor]:
+    """What the network takes and gives."""
+    box = Domain(low=(0.0, 0.0, 0.0, -1.0, -1.0), high=(1.0,) * COLOUR_INPUTS)
+    meaning = "x y z, 0 to 1; row and column, -1 to 1"
+    place = graph_input("place", "float64", ("n", COLOUR_INPUTS), "1", meaning, box)
+    colours = Tensor(
+        name="colours",
+        dtype="float32",
+        shape=("n", CHANNELS),
+        unit="1",
+        meaning="red green blue, -1 to 1",
+    )
+    return place, colours
+
+
+_CODES_SEED = 0
+_REACH = 2.0
+"""Spacings that a press may be from a code: more than an ObjectFile allows, so that no press is refused."""
+
+
+def first_touch(bench: TouchBench, work: RenderingWork, suffix: str = "") -> RenderingMethod:
+    """1.0's network.
+
+    Args:
+        bench: on which it is measured; it learns at the bench's places.
+        work: where it is stored.
+        suffix: added to its name.
+    """
+    column: Column = "other" if suffix else "1.0 here"
+    note = "one picture a place, whatever the tilt and depth"
+    return RenderingMethod(
+        f"DIGIT-like TouchNet (1.0){suffix}", column, astuple(COLOURS), lambda: _by_colours(bench, work), note
+    )  # fmt: skip
+
+
+def untouched(bench: TouchBench, suffix: str = "") -> RenderingMethod:
+    """The background alone, whatever is pressed."""
+    nothing = np.zeros_like(bench.maps[0])
+    made = MadeMethod(lambda _: bench.picture(nothing))
+    return RenderingMethod(f"untouched gel{suffix}", "other", (), lambda: made, "costs nothing")
+
+
+def touch_methods(bench: TouchBench, of: ObjectFile, work: RenderingWork) -> list[RenderingMethod]:
+    """Every row of touch.
+
+    Args:
+        bench: of the presses.
+        of: the object; its own codes are a row where it has some.
+        work: where networks are stored.
+    """
+    largest = TOUCH_PROFILES["standard"].codes
+    return [
+        untouched(bench),
+        first_touch(bench, work),
+        RenderingMethod(
+            "TouchNet (2.0)",
+            "2.0 here",
+            astuple(TOUCHNET),
+            lambda: _by_touchnet(bench, work),
+            f"its layers; trained here for {TOUCHNET.epochs * TOUCHNET.steps} steps alone",
+        ),
+        _codes("codes of 1 MB", SMALL_CODES, "ours, smallest", bench),
+        *_own(bench, of),
+        _codes("codes of 18 MB, profile standard", largest, "ours, largest", bench),
+        RenderingMethod(
+            "the mesh itself, rasterised",
+            "other",
+            (),
+            lambda: _reference(bench),
+            "the reference: no error by definition",
+        ),
+    ]  # fmt: skip
+
+
+def _own(bench: TouchBench, of: ObjectFile) -> list[RenderingMethod]:
+    entry = of.description.touch
+    if entry is None or entry.codes is None:
+        return []
+    network = entry.codes.network
+    name = f"codes of the ObjectFile, {network.bytes / 1e6:.1f} MB"
+    return [RenderingMethod(name, "ours", (network.sha256,), lambda: _opened(bench, of))]
+
+
+def _opened(bench: TouchBench, of: ObjectFile) -> MadeMethod:
+    touch = open_touch(of, "codes")
+    return MadeMethod(_drawn(bench, touch.at))
+
+
+def _codes(name: str, spec: CodesSpec, column: Column, bench: TouchBench) -> RenderingMethod:
+    return RenderingMethod(name, column, astuple(spec), lambda: _by_codes(bench, spec))
+
+
+def _by_codes(bench: TouchBench, spec: CodesSpec) -> MadeMethod:
+    places, begun = bench.places, time.process_time()
+    coded, spacing = spaced_codes(places.raster, places.sensor, spec, _CODES_SEED)
+    graph = codes_graph(coded.patches, places.sensor, places.skirt)
+    maps = opened_codes(graph, coded.nodes, _REACH * spacing, places.sensor)
+    return MadeMethod(_drawn(bench, maps), time.process_time() - begun)
+
+
+def _by_touchnet(bench: TouchBench, work: RenderingWork) -> MadeMethod:
+    def train() -> bytes:
+        from experiments.paper.rendering_training import train_touchnet
+
+        return train_touchnet(bench, TOUCHNET, work.report)
+
+    data, seconds = stored_graph(work.store, ("touchnet", bench.lesson, astuple(TOUCHNET)), "TouchNet", train)
+    places = bench.places
+    low, high = places.mesh.bounds
+    least, most = pixel_domain(low, high, DEPTHS, MOST_TILT, places.sensor)
+    network = Network(data, PERCEPTRON, *perceptron_tensors(least, most))
+    return MadeMethod(_drawn(bench, PerceptronMaps(network, _gel(bench))), seconds)
+
+
+def _by_colours(bench: TouchBench, work: RenderingWork) -> MadeMethod:
+    def train() -> bytes:
+        from experiments.paper.rendering_training import train_colours
+
+        return train_colours(bench, COLOURS, work.report)
+
+    places = bench.places
+    identity = ("colours", bench.lesson, astuple(COLOURS))
+    data, seconds = stored_graph(work.store, identity, "the tactile network of 1.0", train)
+    place, colours = colours_pair()
+    low, high = places.mesh.bounds
+    shape = places.sensor.rows, places.sensor.columns
+    network = ColourNetwork(Network(data, COLOURS_FILE, [place], [colours]), low, high, shape)
+    return MadeMethod(lambda number: network.picture(bench.presses.points[number]), seconds)
+
+
+def _reference(bench: TouchBench) -> MadeMethod:
+    return MadeMethod(_drawn(bench, ReferenceMaps(bench.places.raster, _gel(bench))))
+
+
+def _gel(bench: TouchBench) -> GelEntry:
+    return GelEntry.of(bench.places.sensor, bench.places.skirt)
+
+
+def _drawn(bench: TouchBench, maps: Maps) -> Render:
+    def observe(number: int) -> AnyArray:
+        return bench.picture(maps(bench.presses[number : number + 1])[0])
+
+    return observe
