@@ -5,21 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 from experiments.scale_estimation.answer import ScaleAnswering
+from experiments.scale_estimation.cells import DRAWN, LOOKING, cells, scene_of
 from experiments.scale_estimation.dials import KNOBS, STARTS
 from experiments.scale_estimation.explorer import performer, plan, smallest_error, steps_of
 from experiments.scale_estimation.report import write
 from experiments.scale_estimation.result import lines_of, result_of
 from experiments.scale_estimation.section import Scale
-from experiments.scale_estimation.table import (
-    DRAWN,
-    LOOKING,
-    METHODS,
-    OURS,
-    PAPER_CM,
-    cells,
-    run_cell,
-    scene_of,
-)
 from harness.effects.accuracy import Accuracy, Setting
 from harness.experiment.experiment import Experiment, MeasuredCondition
 from harness.experiment.plain import PlainPerforms, plain_budgets, plain_measurement
@@ -52,13 +43,9 @@ MEASUREMENT = replace(
         MeasuredCondition("shape", DRAWN, ("known",), ("known",)),
     ),
     cells=cells,
-    run_cell=run_cell,
     settings=_settings,
-    methods=METHODS,
     performed=PlainPerforms(NAME, scene_of),
     counts=(4, 11),
-    regions=OURS,
-    published=PAPER_CM,
 )
 
 EXPERIMENT = Experiment(

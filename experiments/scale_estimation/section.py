@@ -28,7 +28,7 @@ class Scale(Section):
             ``"named"``, as well as an object said to be of it; ``"unknown"``, one of all seven.
         until: m: a run ends when half its 90 % interval is no wider, whatever contacts are left; None to
             make them all.
-        paper_networks: folder of the paper's own networks (``unseen.train --profile paper``), whose rows a
+        paper_networks: folder of the paper's own networks (``experiments.paper.train``), whose rows a
             table then has beside ours; for tables alone.
         seed: of where, how deep and how tilted the contacts are; a run may say another.
     """

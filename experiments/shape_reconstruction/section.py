@@ -38,7 +38,7 @@ class ShapeRun(Section):
             are left; None to make them all.
         library: folder of meshes or ObjectFiles that ``shape.method = "retrieval"`` chooses among; None for
             household shapes that come with the program.
-        pcn: folder of the paper's own networks (``pcn.train --profile paper``), whose rows a table shows
+        pcn: folder of the paper's own networks (``experiments.paper.train``), whose rows a table shows
             beside ours; a run does not use it.
         seed: of where and how deep the presses are; a run may say another.
     """

@@ -21,6 +21,8 @@ class ExperimentRow:
         value: import string of its ``Experiment``; None for a calibration.
         section: name of its table in a scene file; None where it has none.
         model: import string of that table's model.
+        tables: import string of the ``Measurement`` that ``touchstone tables`` measures by, with the paper's
+            baselines among its methods; None for the experiment's own.
         command: the words after ``touchstone`` that read a run of it again.
     """
 
@@ -28,6 +30,7 @@ class ExperimentRow:
     value: str | None = None
     section: str | None = None
     model: str | None = None
+    tables: str | None = None
     command: str = "replay"
 
 
@@ -43,6 +46,7 @@ EXPERIMENTS: dict[str, ExperimentRow] = {
         value="experiments.scale_estimation.experiment:EXPERIMENT",
         section="scale",
         model="experiments.scale_estimation.section:Scale",
+        tables="experiments.paper.scale_table:TABLE",
     ),
     "shape-reconstruction": ExperimentRow(
         about="What does an object never seen look like?",

@@ -14,6 +14,7 @@ from harness.basics.errors import TouchstoneError, WrongUse
 from harness.basics.metrics import Interval, bootstrap, mean, median
 from harness.basics.whole_file import write_text_whole
 from harness.basics.worker_pool import worker_pool
+from harness.bench.experiments import EXPERIMENTS, loaded
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import load_station, station_path
 from harness.experiment.experiment import Experiment, Measurement, RunCell
@@ -115,7 +116,7 @@ def _made(
 def _run(name: str, cell: RunCell, tree: dict[str, Any], recordings: Path | None) -> dict[str, Any]:
     scene, station = scene_from_json(tree, "the table"), load_station(station_path("mock"))
     try:
-        return measurement_of(named(name)).run_cell(cell, scene, station, recordings)
+        return table_of(named(name)).run_cell(cell, scene, station, recordings)
     except TouchstoneError as error:
         # A run that cannot be planned or performed is said to be so; it is no measurement.
         return {"schema": 1, "failed": f"{type(error).__name__}: {error}"}
@@ -157,6 +158,20 @@ def measurement_of(experiment: Experiment) -> Measurement:
     return experiment.measurement
 
 
+def table_of(experiment: Experiment) -> Measurement:
+    """Return what the table of an experiment is measured by: the registry's, or else the experiment's own.
+
+    Raises:
+        WrongUse: it is not measured.
+    """
+    row = EXPERIMENTS.get(experiment.name)
+    if row is None or row.tables is None:
+        return measurement_of(experiment)
+    found = loaded(row.tables)
+    assert isinstance(found, Measurement)
+    return found
+
+
 def rows(experiment: Experiment, results: Results) -> list[TableRow]:
     """The table of what has been measured so far.
 
@@ -166,7 +181,7 @@ def rows(experiment: Experiment, results: Results) -> list[TableRow]:
     performed = {cell: result for cell, result in results.items() if "rows" in result}
     if not performed:
         raise WrongUse("no run of the table has been performed yet")
-    measured = measurement_of(experiment)
+    measured = table_of(experiment)
     found = {method for result in performed.values() for method in result["rows"]}
     return [
         _row(performed, condition, method, measured)

@@ -3,9 +3,6 @@
 Shapes are split, not samples: what is held out is of shapes that nothing was fitted to. The errors there are
 printed and written on the cards, and the width of the answers is made to hold there. Sound and touch need
 torch: ``pip install '.[author]'``. Modes that were solved are kept, so that a run that was stopped goes on.
-
-``--profile paper --to FOLDER`` trains the networks of ObjectFolder 2.0 on the same shapes, for rows of the
-table beside ours: ResNet-18 on a picture and on a spectrogram, a recurrent network on imprints. None ships.
 """
 
 import argparse
@@ -18,7 +15,6 @@ from pathlib import Path
 from types import MappingProxyType
 
 from experiments.scale_estimation.unseen.training.outlines import train_outlines
-from experiments.scale_estimation.unseen.training.paper.paper_profiles import PAPER_PROFILES, PAPER_SENSES
 from experiments.scale_estimation.unseen.training.real_shapes import train_real_shapes
 from harness.basics.cores import own_cores
 
@@ -60,20 +56,16 @@ PROFILES = MappingProxyType(
 def main(arguments: list[str] | None = None) -> int:
     """Make the samples, fit, print what is reached on shapes that were held out, write."""
     options = _parser().parse_args(arguments)
-    paper = options.profile in PAPER_PROFILES
-    senses: tuple[str, ...] = PAPER_SENSES if paper else SENSES
-    folder: Path | None = options.to
-    if options.only:
-        unknown = [sense for sense in options.only if sense not in senses]
-        if unknown:
-            return _refused(f"--profile {options.profile} has no {unknown[0]}; it has {', '.join(senses)}")
-        senses = tuple(sense for sense in senses if sense in options.only)
-    if paper and folder is None:
-        return _refused(f"nothing of --profile {options.profile} ships: add --to FOLDER")
+    if options.profile not in PROFILES:
+        return _refused(
+            f"there is no profile {options.profile}; there are {', '.join(PROFILES)}. The paper's networks "
+            "are trained by python -m experiments.paper.train scale --to FOLDER"
+        )
+    senses = tuple(sense for sense in SENSES if not options.only or sense in options.only)
     fitted = tuple(sense for sense in senses if sense not in WITHOUT_TORCH)
     if find_spec("torch") is None and fitted:
         return _refused("networks need torch: pip install '.[author]', or add --only outline")
-    folder = folder or Path(__file__).parent / "data"
+    folder: Path = options.to or Path(__file__).parent / "data"
     folder.mkdir(parents=True, exist_ok=True)
     if "outline" in senses:
         profile = PROFILES[options.profile]
@@ -97,16 +89,11 @@ def _widen(options: argparse.Namespace, folder: Path) -> None:
 
 def _train(sense: str, options: argparse.Namespace, folder: Path) -> None:
     """One network with its card, written."""
-    # Both need torch.
-    from experiments.scale_estimation.unseen.training.paper.paper_training import train_paper_network
+    # It needs torch.
     from experiments.scale_estimation.unseen.training.train_network import train_network
 
     began = time.perf_counter()
-    if options.profile in PAPER_PROFILES:
-        amounts = PAPER_PROFILES[options.profile]
-        data, card = train_paper_network(sense, amounts, options.seed, options.processes)
-    else:
-        data, card = train_network(sense, PROFILES[options.profile], options.seed, options.processes)
+    data, card = train_network(sense, PROFILES[options.profile], options.seed, options.processes)
     card["profile"], card["seconds"] = options.profile, round(time.perf_counter() - began, 1)
     (folder / f"{sense}.onnx").write_bytes(data)
     (folder / f"{sense}.json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
@@ -116,9 +103,8 @@ def _train(sense: str, options: argparse.Namespace, folder: Path) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--profile", choices=[*PROFILES, *PAPER_PROFILES], default="standard")
-    known = dict.fromkeys((*SENSES, *PAPER_SENSES))
-    parser.add_argument("--only", choices=list(known), action="append", help="again for more than one")
+    parser.add_argument("--profile", default="standard", help=" or ".join(PROFILES))
+    parser.add_argument("--only", choices=SENSES, action="append", help="again for more than one")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--processes", type=int, default=own_cores(), help="that make samples")
     parser.add_argument("--meshes", type=Path, help="folder of scanned things, for real-shapes")

@@ -77,10 +77,10 @@ def tables(
     from harness.commands.scenes import with_assignments
     from harness.experiment.lookup import named
     from harness.experiment.subjects import objects
-    from harness.experiment.tables import by_object, key_of, measure, measurement_of, require_same_keys, rows
+    from harness.experiment.tables import by_object, key_of, measure, require_same_keys, rows, table_of
 
     kind = named(context.info_name or "")
-    measured = measurement_of(kind)
+    measured = table_of(kind)
     out = out or Path("runs/tables") / kind.name
     named_folder = os.environ.get("TOUCHSTONE_DATA")
     shared = Path(named_folder) if named_folder else Path.cwd().parent / "shared" / "data"

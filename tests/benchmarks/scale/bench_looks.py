@@ -10,11 +10,11 @@ from contextlib import closing, suppress
 
 import numpy as np
 
+from experiments.paper.scale_table import by_box
 from experiments.scale_estimation.answer import ScaleAnswering
-from experiments.scale_estimation.baselines import by_box
+from experiments.scale_estimation.cells import ScaleCell, scene_of
 from experiments.scale_estimation.dials import KNOBS
 from experiments.scale_estimation.size import Belief
-from experiments.scale_estimation.table import ScaleCell, scene_of
 from harness.basics.errors import FitRefused
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import Station, load_station, station_path

@@ -18,9 +18,9 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.scale_estimation.answer import ScaleAnswering
+from experiments.scale_estimation.cells import ScaleCell, scene_of
 from experiments.scale_estimation.dials import KNOBS
 from experiments.scale_estimation.size import Belief
-from experiments.scale_estimation.table import ScaleCell, scene_of
 from harness.basics.errors import FitRefused
 from harness.bench.scene import SceneFile, scene_from_options
 from harness.bench.station_file import Station, load_station, station_path

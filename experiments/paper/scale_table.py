@@ -1,37 +1,47 @@
-"""One cell of the table of sizes: a mocked run in process, answered by every method, trivial ones too."""
+"""The paper's table of sizes: a mocked run in process, answered by every method, trivial ones too."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
-from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
-from experiments.scale_estimation.baselines import (
-    by_area,
-    by_box,
-    by_contacts_box,
-    by_first_peak,
-    constant,
-    random_error,
+import numpy as np
+
+from experiments.paper.scale_networks import (
+    SIZE_INPUTS,
+    PaperNetwork,
+    crop_of,
+    paper_networks,
+    sequence_of,
+    spectrogram_of,
 )
+from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
+from experiments.scale_estimation.cells import ScaleCell, scene_of
+from experiments.scale_estimation.experiment import MEASUREMENT
+from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.section import Scale
-from experiments.scale_estimation.size import Belief, fused
+from experiments.scale_estimation.size import Belief, SizeRange, fused
+from experiments.scale_estimation.sound.peaks import Peaks, RingingModel
+from experiments.scale_estimation.touch.patch import Patch
 from experiments.scale_estimation.touch.touch import by_touch
 from experiments.scale_estimation.unseen.answer import imprints_alone
-from experiments.scale_estimation.unseen.paper.network import PaperNetwork, paper_networks
-from experiments.scale_estimation.unseen.paper.rows import PAPER_ROWS, PaperReadings, paper_sizes
-from harness.basics.arrays import ByteArray
+from experiments.scale_estimation.unseen.spectrogram import response_of
+from experiments.scale_estimation.vision.fit import View
+from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import DataRefused, FitRefused
-from harness.bench.scene import SceneFile, scene_from_json
+from harness.bench.acquisition import Strike
+from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.experiment.experiment import Experiment
 from harness.experiment.levels import chosen_levels
 from harness.experiment.lookup import named
 from harness.experiment.plain import perform_in_process
 from harness.experiment.truth import read_truth
-from harness.picture.outline import SeenOutline
+from harness.picture.object_mask import mask_by_background
+from harness.picture.outline import SeenOutline, directions
 from harness.recording.observation import look_pictures
 from harness.recording.run_folder import RunFiles
 
@@ -53,68 +63,24 @@ OURS = (
     "audio + touch",
     "fused",
 )
+PAPER_ROWS = MappingProxyType(
+    {
+        "picture": "ResNet-18, picture",
+        "spectrogram": "ResNet-18, spectrogram",
+        "imprints": "GRU, imprints without poses",
+    }
+)
+"""Names of rows, by sense."""
+
 METHODS = (*TRIVIAL, *PAPER_ROWS.values(), *OURS)
 
 GROSS = 0.1
 """Of the size: an error beyond is a failure."""
 
-LOOKING = ("yes", "no")
-"""Whether the camera looks first; where it does not, the first contacts are made blindly."""
-
-DRAWN = ("known", "unknown")
-"""Whether the arm explores an object whose shape it knows. Where it does, the rows of objects never drawn are
-answered from the same readings; where not, they are from contacts that nobody could plan on a drawing."""
-
 PAPER_CM = {"vision": (5.08,), "audio": (4.68,), "touch": (3.51,)}
 """Mean errors on real objects, of networks that do not know the object: ObjectFolder 2.0, table 3."""
 
 FEW = 3
-
-
-@dataclass(frozen=True)
-class ScaleCell:
-    """Which run."""
-
-    object: str
-    gap: str
-    seed: int
-    look: str
-    shape: str = "known"
-
-    @property
-    def name(self) -> str:
-        """Of the run's file; a gap may be a path."""
-        drawn = "" if self.shape == "known" else f"-{self.shape}"
-        return f"{self.object}-{self.gap.replace('/', '_')}-{self.look}{drawn}-{self.seed}"
-
-    @property
-    def conditions(self) -> dict[str, str]:
-        """What was varied."""
-        return {"gap": self.gap, "look": self.look, "shape": self.shape}
-
-
-def cells(
-    objects: Sequence[str], seeds: Sequence[int], chosen: Mapping[str, Sequence[str]]
-) -> list[ScaleCell]:
-    """All of them, an object's after the other's of one seed."""
-    return [
-        ScaleCell(name, gap, seed, look, shape)
-        for seed in seeds
-        for gap in chosen["gap"]
-        for look in chosen["look"]
-        for shape in chosen["shape"]
-        for name in objects
-    ]
-
-
-def scene_of(scene: SceneFile, cell: ScaleCell) -> SceneFile:
-    """The scene of a table's object, its size hidden and every sense asked for."""
-    tree = scene.model_dump(mode="json", by_alias=True)
-    tree["object"]["scale"] = "hidden"
-    tree["sensors"].update(camera=cell.look == "yes", sound=True, touch=True)
-    # The paper's networks answer a run and change nothing of it: recordings do not depend on them.
-    tree.setdefault(Scale.table, {}).update(shape=cell.shape, paper_networks=None)
-    return scene_from_json(tree, cell.name)
 
 
 def run_cell(
@@ -272,3 +238,124 @@ def _belief(belief: Belief, true: float, seconds: float) -> dict[str, Any]:
 def _value(size: float, true: float, seconds: float) -> dict[str, Any]:
     error = abs(size - true)
     return {"size_m": size, "error_m": error, "gross": bool(error > GROSS * true), "seconds": seconds}
+
+
+_TURNS = 8
+
+
+def random_error(sizes: SizeRange, true: float) -> float:
+    """M, the mean error of a size drawn from the range, even in its logarithm."""
+    inside = np.exp(sizes.logs[sizes.inside.astype(bool)])
+    return float(np.abs(inside - true).mean())
+
+
+def constant(sizes: SizeRange) -> float:
+    """M, the middle of the range."""
+    return float(np.sqrt(sizes.low * sizes.high))
+
+
+def by_first_peak(peaks: Peaks, model: RingingModel, nominal: float) -> float:
+    """M, were the lowest peak the lowest mode."""
+    return float(nominal * model.frequencies[0] / peaks.frequencies[0])
+
+
+def by_area(outline: SeenOutline, view: View, nominal: float) -> float:
+    """M, from the area of the outline's hull over the model's, over turns, at its nominal place."""
+    stands = np.zeros((_TURNS, len(view.sigmas)))
+    stands[:, 3] = np.arange(_TURNS) * 2.0 * np.pi / _TURNS
+    reach = view.project(stands, view.corners) @ directions().T
+    mean = float(np.mean([_area(one) for one in reach.max(axis=1)]))
+    return float(nominal * np.sqrt(_area(outline.extents) / mean))
+
+
+def by_box(outline: SeenOutline, view: View) -> float:
+    """M, the longer side of the outline's box at the distance of where the object stands; no model of it."""
+    count = len(outline.extents)
+    widths = outline.extents + np.roll(outline.extents, -(count // 2))
+    distance = (view.base_from_camera[:3, 2] @ (view.place - view.base_from_camera[:3, 3])) / view.focal_px
+    return float(max(widths[0], widths[count // 4]) * distance)
+
+
+def by_contacts_box(patches: list[Patch], model: ObjectModel) -> float:
+    """M, from the area of the outline's hull over the model's, averaged over turns."""
+    places = np.concatenate([patch.points for patch in patches])
+    low = np.minimum(places.min(axis=0), [np.inf, np.inf, model.place[2]])
+    return float((places.max(axis=0) - low).max())
+
+
+def _area(extents: FloatArray) -> float:
+    """Px^2, of the polygon whose sides stand so far out in evenly spaced directions."""
+    step = 2.0 * np.pi / len(extents)
+    before, after = np.roll(extents, 1), np.roll(extents, -1)
+    sides = (before + after - 2.0 * extents * np.cos(step)) / np.sin(step)
+    return float(0.5 * np.sum(extents * sides))
+
+
+_Views = list[dict[str, FloatArray]]
+
+
+@dataclass(frozen=True, eq=False)
+class PaperReadings:
+    """The readings of a run as the paper has them: no poses, no material.
+
+    Attributes:
+        pictures: ``(rows, columns, 3)`` RGB with the object and without it; None without a look.
+        focal_px: pixels of the camera's focal length.
+        strikes: all that were made.
+        patches: of the contacts that met the object, in their order.
+    """
+
+    pictures: tuple[ByteArray, ByteArray] | None
+    focal_px: float
+    strikes: Sequence[Strike]
+    patches: Sequence[Patch]
+
+    def views(self, sense: str) -> _Views:
+        """The inputs of a sense's network, one or more.
+
+        Raises:
+            FitRefused: the run has no reading of the sense.
+        """
+        made: dict[str, Callable[[], _Views]] = {
+            "picture": self._crop, "spectrogram": self._spectrograms, "imprints": self._sequence,
+        }  # fmt: skip
+        return made[sense]()
+
+    def _crop(self) -> _Views:
+        if self.pictures is None:
+            raise FitRefused("the camera has not looked yet")
+        live, bare = self.pictures
+        return [{"crop": crop_of(live, mask_by_background(live, bare), self.focal_px)}]
+
+    def _spectrograms(self) -> _Views:
+        found = response_of(self.strikes)
+        if found is None:
+            raise FitRefused("no strike may be used: none was made, or none excited anything")
+        responses, rate, band = found
+        return [{"spectrogram": spectrogram_of(response, rate, band)} for response in responses]
+
+    def _sequence(self) -> _Views:
+        rows, last = sequence_of([patch.points for patch in self.patches])
+        return [{"imprints": rows, "last": last}]
+
+
+def paper_sizes(
+    networks: Mapping[str, PaperNetwork], readings: PaperReadings
+) -> dict[str, tuple[float | FitRefused, float]]:
+    """By row: the size in m, or why there is none; and the seconds that it took."""
+    found: dict[str, tuple[float | FitRefused, float]] = {}
+    for sense in SIZE_INPUTS:
+        if sense in networks:
+            began = now()
+            size: float | FitRefused
+            try:
+                size = networks[sense].size(readings.views(sense))
+            except FitRefused as refusal:
+                size = refusal
+            found[PAPER_ROWS[sense]] = size, now() - began
+    return found
+
+
+TABLE = replace(
+    MEASUREMENT, run_cell=run_cell, methods=METHODS, regions=OURS, gross=MEASUREMENT.gross, published=PAPER_CM
+)

@@ -6,16 +6,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.scale_estimation.baselines import by_area, by_box, by_first_peak, constant, random_error
+from experiments.paper.scale_networks import SIZE_INPUTS
+from experiments.paper.scale_table import (
+    METHODS,
+    PAPER_ROWS,
+    by_area,
+    by_box,
+    by_first_peak,
+    constant,
+    random_error,
+    run_cell,
+)
+from experiments.scale_estimation.cells import ScaleCell, scene_of
 from experiments.scale_estimation.dials import STARTS
 from experiments.scale_estimation.experiment import MEASUREMENT
 from experiments.scale_estimation.size import SizeRange
-from experiments.scale_estimation.table import METHODS, ScaleCell, run_cell, scene_of
-from experiments.scale_estimation.unseen.paper.inputs import INPUTS
-from experiments.scale_estimation.unseen.paper.rows import PAPER_ROWS
 from harness.bench.scene import scene_from_json
 from harness.bench.station_file import Station
-from tests.experiments.scale_estimation.test_paper_networks import write_means
+from tests.experiments.paper.test_scale_networks import write_means
 from tests.experiments.scale_estimation.test_sound import NOMINAL, model, peaks_at
 from tests.experiments.scale_estimation.test_vision import nominal, outline_at, view_of
 
@@ -55,7 +63,7 @@ def test_the_outline_s_box_is_foreshortened_and_knows_no_model() -> None:
 def test_a_cell_is_answered_by_every_method_and_a_refusal_claims_no_more_than_the_range(
     station: Station, tmp_path: Path
 ) -> None:
-    write_means(tmp_path, *INPUTS)
+    write_means(tmp_path, *SIZE_INPUTS)
     asked = {"contacts": 3, "strikes": 1, "paper_networks": str(tmp_path)}
     tree = {"schema": 1, "object": {"mesh": "builtin:mug"}, "scale": asked}
     cell = ScaleCell("mug", "unplaced", 3, "yes")

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from experiments.scale_estimation.unseen.paper.inputs import FIELD, SIDE, sequence_of, spectrogram_of
+from experiments.paper.scale_networks import FIELD, SIDE, sequence_of, spectrogram_of
 from experiments.scale_estimation.unseen.training.contact_samples import TouchableShape, imprint_sample
 from experiments.scale_estimation.unseen.training.outlines import PLACE, PUT, drawn_camera
 from experiments.scale_estimation.unseen.training.samples import SampleRow, draw_size, ringing_of, shape_of

@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.scale_estimation.unseen.paper.inputs import INPUTS, STEPS
-from experiments.scale_estimation.unseen.paper.network import opened_paper
-from experiments.scale_estimation.unseen.train import main
+from experiments.paper.scale_networks import SIZE_INPUTS, STEPS, opened_paper
+from experiments.paper.train import main
 
 torch = pytest.importorskip("torch", reason="the extra 'author' is not installed")
 
-from experiments.scale_estimation.unseen.training.paper.paper_fit import (  # noqa: E402
+from experiments.paper.scale_training import (  # noqa: E402
     MODULES,
     USUAL,
     fitted_paper,
@@ -34,7 +33,7 @@ def one_thread() -> None:
 def drawn(sense: str, count: int) -> list[Any]:
     """Inputs of a network; of imprints, sequences of other lengths."""
     torch.manual_seed(4)
-    given = [torch.randn((count, *shape)) for _, shape in INPUTS[sense]]
+    given = [torch.randn((count, *shape)) for _, shape in SIZE_INPUTS[sense]]
     if sense == "imprints":
         given[1] = torch.eye(STEPS)[torch.arange(count) * 5 % STEPS]
     return given
@@ -52,7 +51,7 @@ def test_resnet_18_has_the_published_layers() -> None:
         assert found.shape == (1, 512, 7, 7)
 
 
-@pytest.mark.parametrize("sense", list(INPUTS))
+@pytest.mark.parametrize("sense", list(SIZE_INPUTS))
 def test_a_graph_answers_as_torch_does(sense: str, tmp_path: Path) -> None:
     given, module = drawn(sense, 3), MODULES[sense]()
     with torch.no_grad():
@@ -61,7 +60,7 @@ def test_a_graph_answers_as_torch_does(sense: str, tmp_path: Path) -> None:
         wanted = module.eval()(*given).numpy()
     (tmp_path / f"{sense}.onnx").write_bytes(paper_graph(sense, module))
     (tmp_path / f"{sense}.json").write_text("{}")
-    names = [name for name, _ in INPUTS[sense]]
+    names = [name for name, _ in SIZE_INPUTS[sense]]
     values = [value.numpy() for value in given]
     found = opened_paper(tmp_path, sense).network(dict(zip(names, values, strict=True)))["log_size"]
     assert found == pytest.approx(wanted, abs=2e-2 * max(1.0, float(np.ptp(wanted))))  # half precision
@@ -96,11 +95,21 @@ def test_a_smoke_training_ends_in_a_network_and_its_card(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("TOUCHSTONE_CACHE", str(tmp_path / "cache"))
-    asked = ["--profile", "paper-smoke", "--only", "picture", "--to", str(tmp_path), "--processes", "1"]
+    asked = [
+        "scale",
+        "--profile",
+        "paper-smoke",
+        "--only",
+        "picture",
+        "--to",
+        str(tmp_path),
+        "--processes",
+        "1",
+    ]
     assert main(asked) == 0
     card = json.loads((tmp_path / "picture.json").read_text())
     assert card["held_out"]["samples"] > 0
     assert card["profile"] == "paper-smoke"
     network = opened_paper(tmp_path, "picture")
-    size = network.size([{"crop": np.zeros(INPUTS["picture"][0][1])}])
+    size = network.size([{"crop": np.zeros(SIZE_INPUTS["picture"][0][1])}])
     assert 0.0 < size < np.inf

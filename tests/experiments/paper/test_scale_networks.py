@@ -6,25 +6,26 @@ import numpy as np
 import pytest
 from onnx import ModelProto
 
-from experiments.scale_estimation.explorer import plan
-from experiments.scale_estimation.touch.patch import Patch
-from experiments.scale_estimation.unseen.paper.inputs import (
+from experiments.paper.scale_networks import (
     FRAMES,
-    INPUTS,
     LINES,
     RANGE,
     SIDE,
+    SIZE_INPUTS,
     STEPS,
     WINDOW,
     crop_of,
+    paper_networks,
     sequence_of,
     spectrogram_of,
 )
-from experiments.scale_estimation.unseen.paper.network import paper_networks
-from experiments.scale_estimation.unseen.paper.rows import PAPER_ROWS, PaperReadings, paper_sizes
-from experiments.scale_estimation.unseen.train import main
+from experiments.paper.scale_samples import PAPER_MAKERS, crop_camera
+from experiments.paper.scale_table import PAPER_ROWS, PaperReadings, paper_sizes
+from experiments.paper.train import main
+from experiments.scale_estimation.explorer import plan
+from experiments.scale_estimation.touch.patch import Patch
+from experiments.scale_estimation.unseen import train as own
 from experiments.scale_estimation.unseen.training.outlines import PLACE, drawn_camera
-from experiments.scale_estimation.unseen.training.paper.paper_samples import PAPER_MAKERS, crop_camera
 from experiments.scale_estimation.unseen.training.samples import shape_of
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray
 from harness.basics.errors import DataRefused, FitRefused, WrongUse
@@ -177,7 +178,7 @@ def test_samples_fit_their_network_and_come_again(sense: str) -> None:
     made, again = (PAPER_MAKERS[sense](5, 3, 6) for _ in range(2))
     assert made
     for (inputs, size), (same, as_large) in zip(made, again, strict=True):
-        assert {name: values.shape for name, values in inputs.items()} == dict(INPUTS[sense])
+        assert {name: values.shape for name, values in inputs.items()} == dict(SIZE_INPUTS[sense])
         assert all(np.isfinite(values).all() for values in inputs.values())
         assert all(np.array_equal(values, same[name]) for name, values in inputs.items())
         assert 0.05 <= size == as_large <= 0.6
@@ -185,11 +186,11 @@ def test_samples_fit_their_network_and_come_again(sense: str) -> None:
 
 def mean_graph(sense: str) -> ModelProto:
     """A graph that gives the mean of the first input as the logarithm."""
-    nodes, (name, shape) = Nodes(), INPUTS[sense][0]
+    nodes, (name, shape) = Nodes(), SIZE_INPUTS[sense][0]
     axes = list(range(1, len(shape) + 1))
     mean = nodes.add("ReduceMean", name, axes=axes, keepdims=0)
     nodes.add("Unsqueeze", mean, nodes.constant(np.array([1], np.int64)), name="log_size")
-    inputs = [float_value(each, ("n", *size)) for each, size in INPUTS[sense]]
+    inputs = [float_value(each, ("n", *size)) for each, size in SIZE_INPUTS[sense]]
     return nodes.model(sense, inputs, [float_value("log_size", ("n", 1))], "a mean")
 
 
@@ -223,7 +224,7 @@ def test_a_folder_without_networks_without_cards_or_with_another_sense_s_is_refu
 
 
 def test_rows_are_of_the_networks_there_and_a_missing_reading_is_a_refusal(tmp_path: Path) -> None:
-    write_means(tmp_path, *INPUTS)
+    write_means(tmp_path, *SIZE_INPUTS)
     networks = paper_networks(tmp_path)
     picture, mask = blob(200, 250)
     bare = picture.copy()
@@ -252,14 +253,12 @@ def test_a_run_that_names_the_networks_of_a_table_is_refused(station: Station) -
 def test_the_command_line_of_the_paper_s_profile_is_refused_in_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["--profile", "paper"]) == 2
-    assert "--to FOLDER" in capsys.readouterr().err
     to = ["--to", str(tmp_path / "none")]
-    assert main(["--profile", "paper", "--only", "sound", *to]) == 2
+    assert main(["scale", "--only", "sound", *to]) == 2
     assert "it has picture, spectrogram, imprints" in capsys.readouterr().err
-    assert main(["--only", "picture", *to]) == 2
-    assert "it has outline, sound" in capsys.readouterr().err
-    monkeypatch.setattr("experiments.scale_estimation.unseen.train.find_spec", lambda _name: None)
-    assert main(["--profile", "paper", *to]) == 2
+    assert own.main(["--profile", "paper", *to]) == 2
+    assert "experiments.paper.train scale --to FOLDER" in capsys.readouterr().err
+    monkeypatch.setattr("experiments.paper.train.find_spec", lambda _name: None)
+    assert main(["scale", *to]) == 2
     assert "torch" in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
