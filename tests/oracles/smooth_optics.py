@@ -31,11 +31,7 @@ class SmoothOptics:
         to_pixels(np.zeros(pressed.shape), pressed, 1.0 / self._known.header.pitch, z)
         down, right = (np.pad(slope[1:-1, 1:-1], 1, mode="edge") for slope in np.gradient(z))
         steep = np.hypot(down, right)
-        sine, knee = steep / np.sqrt(1.0 + steep**2), KNEE * limit
-        room = max(limit - knee, 1e-12)
-        bent = np.where(
-            sine <= knee, sine, knee + room * (1.0 - np.exp(-np.maximum(sine - knee, 0.0) / room))
-        )
+        bent = softly_limited(steep / np.sqrt(1.0 + steep**2), limit)
         scale = bent / np.where(steep > 0.0, steep, 1.0)
         image = self._known.background.astype(np.float64)
         touched = np.stack(np.nonzero((steep > 0.0) | (z != 0.0)))
@@ -52,3 +48,10 @@ class SmoothOptics:
             return np.asarray(design(normal, where) @ known.smooth)
         light = light_design(normal, where) @ known.light
         return np.asarray(design(normal, where) @ known.slopes + z[:, None] * known.header.pitch * light)
+
+
+def softly_limited(sine: FloatArray, limit: float) -> FloatArray:
+    """Bend the sines of slopes towards ``limit`` beyond the knee."""
+    knee, room = KNEE * limit, max((1.0 - KNEE) * limit, 1e-12)
+    bent = knee + room * (1.0 - np.exp(-np.maximum(sine - knee, 0.0) / room))
+    return np.where(sine <= knee, sine, bent)

@@ -43,7 +43,7 @@ def _ball(radius: float, depth: float, at: Pair = (1e-3, -0.5e-3)) -> FloatArray
 
 def _picture(heights: FloatArray) -> ByteArray:
     gel = deform(np.minimum(heights, THICK)[None], WORLD.calibration.header.skirt)
-    return SmoothOptics(WORLD.calibration).render(gel).images[0]
+    return np.asarray(SmoothOptics(WORLD.calibration).render(gel).images[0])
 
 
 def _read(heights: FloatArray) -> DepthReading:
