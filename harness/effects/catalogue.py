@@ -35,7 +35,15 @@ Levels = Mapping[str, Level]
 
 SUPERSAMPLING = Knob("touch.supersampling", (1, 2, 3), "rays a side", "number", 1, "rays a pixel, each way")
 GEL = Knob("touch.gel", ("fast", "exact"), "", "method", "exact", "how wide blurs of the gel are done")
-OPTICS = Knob("touch.optics", ("fast", "exact"), "", "method", "fast", "slope to colour")
+OPTICS = Knob(
+    "touch.optics",
+    ("fast", "exact"),
+    "",
+    "method",
+    "fast",
+    "slope to colour",
+    removed={"smooth": "use touch.optics=fast"},
+)
 MARKER_NODES = Knob("touch.marker_motion", (2, 4, 8), "nodes", "number", 4, "loads to one gel thickness")
 
 

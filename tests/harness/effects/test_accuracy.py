@@ -6,7 +6,9 @@ from harness.basics.errors import WrongUse
 from harness.effects.accuracy import Accuracy, Knob, Level
 
 GRID = Knob("touch.grid", (30, 60, 120), "px", "number", 60)
-OPTICS = Knob("touch.optics", ("fast", "exact"), "", "method", "fast")
+OPTICS = Knob(
+    "touch.optics", ("fast", "exact"), "", "method", "fast", removed={"smooth": "use touch.optics=fast"}
+)
 ZERO = Knob("rounds", (0, 1, 3), "", "number", 3)
 KNOBS = (GRID, OPTICS, ZERO)
 
