@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import BenchFault, ProtectiveStop, TouchstoneError, WrongUse
+from harness.bench import opening as module
 from harness.bench.device import Health
 from harness.bench.opening import checked, open_camera, open_each, scene_of_all
-from harness.bench.opening import open_each as module
 from harness.bench.reading import Channel, Reading
 from harness.bench.station import RunContext
 from harness.bench.station_file import Station, load_station, station_path
