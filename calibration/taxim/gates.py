@@ -18,7 +18,7 @@ from scipy.fft import irfft2, next_fast_len, rfft2
 from calibration.taxim.pictures import Pictures, Refused
 from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, block_means
 from harness.basics.errors import CalibrationRefused, PictureRefused
-from harness.sim.optics.check.faults import require_whole
+from harness.sim.optics.check.picture_check import require_whole
 
 CONTACT = 0.8
 """Ball radii: what a contact is taken to be until the fit has found its edge."""

@@ -34,8 +34,14 @@ def explain(
     from harness.bench.scene_objectfile import holds_objectfile, objectfile_folder
     from harness.bench.station_file import load_station, station_path
     from harness.effects.catalogue import EFFECTS
-    from harness.effects.explain import as_json, as_table, scene_plan
-    from harness.effects.explain_networks import networks_as_json, networks_as_table, networks_in_use
+    from harness.effects.explain import (
+        as_json,
+        as_table,
+        networks_as_json,
+        networks_as_table,
+        networks_in_use,
+        scene_plan,
+    )
     from harness.effects.file_levels import scene_levels
     from harness.effects.plan import default_accuracy
 

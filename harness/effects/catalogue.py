@@ -7,7 +7,7 @@ which the caller gives: ``object.mesh`` (``Mesh``), ``object.material`` (``Mater
 ``sensor.noise`` (grey levels), ``seed``; for forces those of ``harness.effects.force_effects``; for sound
 those of ``harness.effects.sound_effects``; for pictures those of ``harness.effects.camera_effects``; for
 touch and pictures from an ObjectFile those of ``harness.effects.touch_file_effects`` and
-``harness.effects.camera_file_effects``.
+``harness.effects.camera_effects``.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,7 +17,7 @@ import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.effects.accuracy import Knob, Level
-from harness.effects.camera_file_effects import scene_camera_effects
+from harness.effects.camera_effects import scene_camera_effects
 from harness.effects.effect import Condition, Effect
 from harness.effects.force_effects import FORCE_EFFECT
 from harness.effects.sound_effects import SOUND_EFFECTS
@@ -26,7 +26,7 @@ from harness.effects.touch_file_effects import FILE_EFFECTS, SHAPES, gel_from
 from harness.sim.gel.gel import deform, over_range
 from harness.sim.gel.height_map import RasterMesh
 from harness.sim.gel.markers import draw_markers, marker_displacements
-from harness.sim.optics.noise import with_camera_noise
+from harness.sim.optics.optics import with_camera_noise
 from harness.sim.optics.shadow_image import darkened, darkening
 from harness.sim.optics.tactile_calibration import Float32Array
 

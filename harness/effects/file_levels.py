@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from harness.bench.scene import SceneFile
 from harness.effects.accuracy import Knob, Level
-from harness.effects.camera_file_effects import LOOK
+from harness.effects.camera_effects import LOOK
 from harness.effects.scene_object import named_file
 from harness.effects.sound_effects import SHAPES as SOUND
 from harness.effects.touch_file_effects import SHAPES as TOUCH

@@ -5,6 +5,7 @@ Sources, beside those of the touch: ``sensor.elastic`` (how stiff the gel is, ``
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,12 @@ from harness.bench.sensor import TactileSensor
 from harness.effects.accuracy import Knob, Level
 from harness.effects.effect import Effect, Implementation
 from harness.sim.gel.contact_force import PARTS, ContactForce, ForceLevel, contact_force, require_depths
+from harness.sim.gel.elastic import GelElastic
 from harness.sim.gel.force_table import ForceTable
+from harness.sim.optics.depth_reading import DepthReading
 
 Given = Mapping[str, Any]
 Levels = Mapping[str, Level]
-
 FORCE = Knob(
     "touch.force",
     ("table", "winkler", "layer"),
@@ -36,6 +38,26 @@ OF_GEL = 0.1
 """Share of the deepest pixel from which the surface of a gel is taken to be pressed."""
 
 _NEEDS = ("touch.height_map", "sensor", "sensor.elastic")
+
+_OTHER_SHARES = (0.05, 0.2)
+"""Of the deepest pixel, from which the gel might be taken to be pressed as well."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReadForce:
+    """The force of one reading.
+
+    Attributes:
+        pressed: all but the reading's own error, of one press.
+        reading: share of the force, one standard deviation: what the reading is off by.
+        newtons: exactly 0 where nothing was seen to press.
+        uncertainty: N, one standard deviation.
+    """
+
+    pressed: ContactForce
+    reading: float
+    newtons: float
+    uncertainty: float
 
 
 def _by(level: ForceLevel, given: Given, cells: int) -> ContactForce:
@@ -109,3 +131,36 @@ FORCE_EFFECT = Effect(
         "table": Implementation(("touch.height_map", "sensor", "sensor.forces"), _by_table),
     },
 )
+
+
+def read_force(
+    read: DepthReading, thickness: float, gel: GelElastic, level: ForceLevel = "layer"
+) -> ReadForce:
+    """The force of a press that was read.
+
+    Args:
+        read: surface and error.
+        thickness: metres of the gel.
+        gel: how stiff it is.
+        level: how it is computed; what the reading adds is computed by springs.
+
+    Raises:
+        OutOfDomain: the reading is deeper than the gel is thick.
+    """
+    surface = read.height if read.contact.any() else np.zeros_like(read.height)
+    pressed = contact_force(pressed_of_gel(surface)[None], read.pitch, thickness, gel, level)
+    newtons = float(pressed.newtons[0])
+    if newtons == 0.0:
+        return ReadForce(pressed, 0.0, 0.0, 0.0)
+
+    def springs(depth: FloatArray) -> float:
+        held = np.clip(depth, 0.0, thickness)
+        return float(contact_force(held[None], read.pitch, thickness, gel, "winkler").newtons[0])
+
+    middle = pressed_of_gel(surface)
+    here = springs(middle)
+    high, low = (springs(np.where(middle > 0.0, surface + by * read.sigma, 0.0)) for by in (1.0, -1.0))
+    by_error = (high - low) / (2.0 * here)
+    more, less = (springs(pressed_of_gel(surface, share)) for share in _OTHER_SHARES)
+    reading = float(np.hypot(by_error, (more - less) / (2.0 * here)))
+    return ReadForce(pressed, reading, newtons, float(np.hypot(pressed.uncertainty[0], newtons * reading)))

@@ -35,7 +35,7 @@ _NEEDS = ("object.file", "object.mesh", "object.wall", "sensor", "sensor.calibra
 
 
 def _presses(given: Given, _levels: Levels) -> "Presses":
-    from harness.sim.gel.pressed_place import presses_of
+    from harness.sim.gel.presses import presses_of
 
     return presses_of(given["object.mesh"], given["contact.gel_from_object"])
 

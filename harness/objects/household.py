@@ -1,22 +1,25 @@
 """Six household objects, modelled here: closed, hollow where the real thing is, upright on z = 0."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
-from manifold3d import CrossSection
+from manifold3d import CrossSection, FillRule, triangulate
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from harness.basics.arrays import FloatArray
+from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
 from harness.objects.builtin import HOUSEHOLD
-from harness.objects.outline import half_profile, polygon, rounded, stroke, walked
-from harness.objects.slab import slab
 from harness.objects.solid import from_manifold, lathe, outward, to_manifold, tube, union
 
 _MM = 1e-3
 _FINEST_EDGE, _COARSEST_EDGE = 0.3e-3, 10e-3
+
+_ROUND = 96
+_LARGEST_TURN = np.radians(22.0)
+_STEPS_ROUND = 4
 
 
 def build(name: str, edge: float = 3e-3) -> Mesh:
@@ -204,3 +207,148 @@ _BUILDERS: MappingProxyType[str, Callable[[float], Mesh]] = MappingProxyType(
 
 MATERIALS = HOUSEHOLD
 """Material of each object unless the scene names another."""
+
+
+def stroke(centre_line: FloatArray, thickness: FloatArray) -> CrossSection:
+    """The area a round brush covers, drawn along ``(n, 2)`` points with ``(n,)`` diameters in mm."""
+    discs = [
+        CrossSection.circle(d / 2.0, _ROUND).translate((x, y))
+        for (x, y), d in zip(centre_line, thickness, strict=True)
+    ]
+    hulls = [CrossSection.batch_hull([a, b]) for a, b in pairwise(discs)]
+    total = hulls[0]
+    for hull in hulls[1:]:
+        total = total + hull
+    return total
+
+
+def polygon(points: list[tuple[float, float]]) -> CrossSection:
+    """The area inside a polygon whose corners go counter-clockwise, in mm."""
+    return CrossSection([np.array(points)], FillRule.Positive)
+
+
+def rounded(area: CrossSection, outer: float, inner: float) -> CrossSection:
+    """The area with convex corners rounded to radius ``outer`` and concave ones to ``inner``, in mm."""
+    opened = area.offset(-outer, circular_segments=_ROUND).offset(outer, circular_segments=_ROUND)
+    return opened.offset(inner, circular_segments=_ROUND).offset(-inner, circular_segments=_ROUND)
+
+
+def half_profile(area: CrossSection, outer: float, inner: float) -> FloatArray:
+    """The outline, right of the axis, of an area drawn there and rounded with its mirror image.
+
+    Args:
+        area: drawn at radius >= 0, in mm.
+        outer: mm, radius of convex corners.
+        inner: mm, radius of concave corners.
+
+    Returns:
+        ``(n, 2)`` mm (radius, height), from the lowest point on the axis round to the highest.
+
+    Raises:
+        ValueError: the area is not one piece that touches the axis.
+    """
+    whole = rounded(area + area.mirror((1.0, 0.0)), outer, inner)
+    _, least_y, most_x, most_y = whole.bounds()
+    right = CrossSection.square((most_x + 1.0, most_y - least_y + 2.0)).translate((0.0, least_y - 1.0))
+    contours = (whole ^ right).to_polygons()
+    if len(contours) != 1:
+        raise ValueError(f"a profile is one piece that touches the axis; this one has {len(contours)}")
+    points: FloatArray = np.asarray(contours[0], dtype=np.float64)
+    on_axis = np.flatnonzero(points[:, 0] < 1e-9)
+    if len(on_axis) < 2:
+        raise ValueError("a profile begins and ends on the axis; this one does not reach it")
+    start = int(on_axis[np.argmin(points[on_axis, 1])])
+    ordered = np.roll(points, -start, axis=0)
+    return ordered[: int(np.flatnonzero(ordered[:, 0] < 1e-9)[-1]) + 1]
+
+
+def walked(points: FloatArray, step: float, closed: bool = False) -> FloatArray:
+    """Points along a line at most ``step`` apart, closer where it bends.
+
+    Args:
+        points: ``(n, 2)`` corners of the line.
+        step: longest distance between two neighbours, in the unit of the points.
+        closed: whether the last point is joined to the first.
+
+    Returns:
+        ``(m, 2)``, with both ends of an open line kept.
+    """
+    line = np.vstack([points, points[:1]]) if closed else points
+    line = line[np.r_[True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9]]
+    legs = np.diff(line, axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    headings = np.unwrap(np.arctan2(legs[:, 1], legs[:, 0]))
+    # A corner's turn is spent over the legs beside it; each unit of "effort" earns one point.
+    turns = np.abs(np.diff(headings, append=headings[-1:]))
+    effort = np.maximum(lengths / step, 0.0) + 0.5 * (turns + np.r_[0.0, turns[:-1]]) / _LARGEST_TURN
+    done = np.r_[0.0, np.cumsum(effort)]
+    count = max(2, int(np.ceil(done[-1])))
+    at = np.linspace(0.0, done[-1], count + 1)
+    spread = np.column_stack([np.interp(at, done, line[:, i]) for i in range(2)])
+    return spread[:-1] if closed else spread
+
+
+def slab(area: CrossSection, thickness: float, rounding: float, edge: float) -> Mesh:
+    """A plate with the outline of ``area``, centred on z = 0.
+
+    Args:
+        area: outline, with holes; its convex corners have a radius above ``rounding``.
+        thickness: mm.
+        rounding: mm, radius of the edges between faces and sides.
+        edge: mm between vertices along the outline.
+
+    Returns:
+        A watertight mesh, outward; its two flat faces have no vertices inside.
+    """
+    insets, heights = _section(thickness, rounding, edge)
+    loops = [walked(np.asarray(contour), edge, closed=True) for contour in area.to_polygons()]
+    normals = [_outward_normals(loop) for loop in loops]
+    sizes = [len(loop) for loop in loops]
+    total = sum(sizes)
+    layers = [
+        np.column_stack([np.vstack(loops) - inset * np.vstack(normals), np.full(total, height)])
+        for inset, height in zip(insets, heights, strict=True)
+    ]
+    cap = _cap([layers[0][start : start + size, :2] for start, size in _runs(sizes)])
+    sides = [
+        _strip(start + k * total, size, total) for start, size in _runs(sizes) for k in range(len(layers) - 1)
+    ]
+    faces = np.vstack([cap[:, ::-1], cap + total * (len(layers) - 1), *sides])
+    return outward(Mesh(np.vstack(layers), faces))
+
+
+def _section(thickness: float, rounding: float, edge: float) -> tuple[FloatArray, FloatArray]:
+    """Inset from the outline and height of every layer of vertices, bottom to top."""
+    angle = np.linspace(0.0, 0.5 * np.pi, _STEPS_ROUND + 1)
+    inset = rounding * (1.0 - np.sin(angle))
+    height = -0.5 * thickness + rounding * (1.0 - np.cos(angle))
+    straight = np.linspace(height[-1], -height[-1], max(2, int(np.ceil(2.0 * -height[-1] / edge)) + 1))
+    insets = np.concatenate([inset, np.zeros(len(straight) - 2), inset[::-1]])
+    return insets, np.concatenate([height[:-1], straight, -height[:-1][::-1]])
+
+
+def _outward_normals(loop: FloatArray) -> FloatArray:
+    """Unit normals to the right of a closed line: away from the material of outlines and holes alike."""
+    tangent = np.roll(loop, -1, axis=0) - np.roll(loop, 1, axis=0)
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    return np.column_stack([tangent[:, 1], -tangent[:, 0]])
+
+
+def _runs(sizes: list[int]) -> list[tuple[int, int]]:
+    return list(zip(np.cumsum([0, *sizes[:-1]]).tolist(), sizes, strict=True))
+
+
+def _cap(loops: list[FloatArray]) -> IntArray:
+    return np.asarray(triangulate(loops), dtype=np.int64)
+
+
+def _strip(start: int, size: int, stride: int) -> IntArray:
+    """Faces between a loop of one layer and the same loop of the next."""
+    here = start + np.arange(size)
+    following = start + np.roll(np.arange(size), -1)
+    return np.vstack(
+        [
+            np.column_stack([here, following, following + stride]),
+            np.column_stack([here, following + stride, here + stride]),
+        ]
+    )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from harness.agreement.agreement import Agreement
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.mesh import Mesh
-from harness.effects.explain_networks import NetworkInUse
+from harness.effects.explain import NetworkInUse
 from harness.report.values import Missing, Posterior
 
 NOT_COMPARED = Missing("the readings were not compared with a model")

@@ -11,7 +11,7 @@ from harness.bench import microphone_take
 from harness.bench.acquisition_channels import CLOCK, FLAGS, FORCE, PRESSURE
 from harness.bench.device import Health
 from harness.bench.reading import Reading
-from harness.effects.explain_networks import NetworkInUse, networks_at
+from harness.effects.explain import NetworkInUse, networks_at
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Experiment, Scored
 from harness.recording.run_folder import RunFiles

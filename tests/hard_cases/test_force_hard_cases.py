@@ -5,8 +5,7 @@ import pytest
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import OutOfDomain
-from harness.sim.gel.contact_force import PARTS, ForceLevel, contact_force
-from harness.sim.gel.contact_pressure import SETTLED, contact_pressure
+from harness.sim.gel.contact_force import PARTS, SETTLED, ForceLevel, contact_force, contact_pressure
 from harness.sim.gel.elastic import GelElastic
 from tests.samples.pressed_shapes import paraboloid, punch
 
@@ -141,7 +140,7 @@ def test_rough_and_tilted_faces_over_the_whole_window_settle(poisson: float, thi
 
 
 def test_pressures_that_do_not_settle_are_no_force(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("harness.sim.gel.contact_pressure._MOST_TURNS", 1)
+    monkeypatch.setattr("harness.sim.gel.contact_force._MOST_TURNS", 1)
     with pytest.raises(OutOfDomain, match="did not settle in 1 turns"):
         contact_force(paraboloid(5e-3, 0.4e-3, PITCH, 64)[None], PITCH, THICK, GEL)
 

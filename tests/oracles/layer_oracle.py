@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from harness.basics.arrays import FloatArray
-from harness.sim.gel.layer_compliance import taken_back
+from harness.sim.gel.elastic import taken_back
 
 _NODES = 80
 _WAVES, _WEIGHTS = np.polynomial.legendre.leggauss(600)

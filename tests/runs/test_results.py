@@ -32,7 +32,7 @@ from tests.support.whole_run import copied
 KERNELS = (
     "harness.sim.gel.height_map:height_maps",
     "harness.sim.gel.gel:deform",
-    "harness.sim.optics.noise:with_camera_noise",
+    "harness.sim.optics.optics:with_camera_noise",
 )
 """Simulation of readings; the estimator has its own cheaper terms, and calls none of these."""
 

@@ -314,7 +314,7 @@ def read_bounded_in_child(path: Path) -> dict[str, Any]:
 
 def _read_both(path: Path) -> dict[str, Any]:
     from harness.basics.errors import TouchstoneError
-    from harness.sim.light.appearance_read import read_appearance
+    from harness.sim.light.appearance_source import read_appearance
     from harness.sim.solid.intake import take_in
 
     errors = []
@@ -334,7 +334,7 @@ def main(arguments: list[str]) -> None:
     """Make the files in a folder; with ``--read``, print what reading each gives, a line of JSON each."""
     paths = make_all(Path(arguments[0]))
     if "--read" in arguments:
-        import harness.sim.light.appearance_read
+        import harness.sim.light.appearance_source
         import harness.sim.solid.intake  # noqa: F401 - before the limits
 
         for path in paths:

@@ -132,7 +132,7 @@ def _colours_key(mesh: str) -> list[str]:
     """Hashes of the files beside a mesh that its colours come from."""
     path = Path(mesh)
     if mesh.startswith(BUILTIN) or path.suffix.lower() != ".obj":
-        return [content_hash("harness.objects.albedo")] if mesh.startswith(BUILTIN) else []
+        return [content_hash("harness.sim.light.appearance_source")] if mesh.startswith(BUILTIN) else []
     libraries = _named_files([path], _NAMES_A_LIBRARY)
     return [_sha256(each) for each in (*libraries, *_named_files(libraries, _NAMES_A_PICTURE))]
 

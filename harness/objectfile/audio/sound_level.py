@@ -20,7 +20,7 @@ from harness.objectfile.same_object import require_same
 from harness.objectfile.surface_file import mesh_from_ply
 from harness.sim.modal.modal import default_edge
 from harness.sim.modal.modes import Modes, dampings
-from harness.sim.solid.finer_surface import with_edges_below
+from harness.sim.solid.filled import with_edges_below
 
 _SAME = 5e-5
 """Relative distance of frequencies that are not parted: as the solver has it of their squares, 1e-4."""

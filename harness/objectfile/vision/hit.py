@@ -22,7 +22,7 @@ from harness.basics.mesh import Mesh
 from harness.objectfile.vision.coverage import Contours, Outline
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import plain
-from harness.sim.light.lambert_kernels import cosine_of, place_on
+from harness.sim.light.lambert import cosine_of, place_on
 
 Surface = tuple[FloatArray, FloatArray, FloatArray]
 """``(m, 3, 3)`` m corners, ``(m, 3)`` unit normals of faces, and ``(m, 3, 3)`` of their corners."""

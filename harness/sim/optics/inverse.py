@@ -14,13 +14,14 @@ from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import CalibrationRefused, DataRefused, PictureRefused
 from harness.sim.optics.check.picture_check import checked_picture
 from harness.sim.optics.poisson import anchored_heights, free_heights
-from harness.sim.optics.slope_kernels import normals_from_colour
+from harness.sim.optics.shading import normals_from_colour
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
 _NARROW, _WIDE = 5, 25
 _RIDGE = 16.0
 _DISTRUST = 0.1
 _MOSTLY = 0.5
+
 _LEAST_REST = 20
 """Pixels of a quiet region that can be told from a chance calm."""
 

@@ -16,8 +16,7 @@ from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import DataRefused
 from harness.sim.optics.contact_depth import Depth
 from harness.sim.optics.poisson import anchored_heights, free_heights
-from harness.sim.optics.shading import shades
-from harness.sim.optics.slope_kernels import normals_from_colour
+from harness.sim.optics.shading import normals_from_colour, shades
 from harness.sim.optics.tactile_calibration import ColourMisfit, TactileCalibration
 
 _RIDGE = 16.0
@@ -39,6 +38,7 @@ _STRANGE = 2.0
 """Times the calibration's residual from which a colour is none of its presses', but dirt or a shadow."""
 
 _WINDOW = 5
+
 _FLOOR = 0.05
 """Pixels of height, one sigma, where the gel is at rest."""
 

@@ -14,10 +14,17 @@ from typing import Literal
 
 import numpy as np
 
-from harness.basics.arrays import ByteArray, FloatArray, IntArray, read_only
+from harness.basics.arrays import AnyArray, ByteArray, FloatArray, IntArray, read_only
 from harness.basics.errors import OutOfDomain
-from harness.sim.optics.fast import PADDED, change_fast, draw_fast, padded
-from harness.sim.optics.kernels import change_exactly, draw_exactly, to_pixels
+from harness.sim.optics.kernels import (
+    PADDED,
+    change_exactly,
+    change_fast,
+    draw_exactly,
+    draw_fast,
+    padded,
+    to_pixels,
+)
 from harness.sim.optics.tactile_calibration import Float32Array, TactileCalibration
 
 OpticsLevel = Literal["exact", "fast"]
@@ -140,3 +147,27 @@ class Optics:
             raise OutOfDomain(
                 f"the heights of contact {int(np.argmax(bad))} are not finite; there is no such gel"
             )
+
+
+def with_camera_noise(images: AnyArray, sigma: float, seed: int) -> FloatArray:
+    """Pictures with independent normal noise on every value.
+
+    A picture's noise depends on the seed and its place in the batch, not on the size of the batch.
+
+    Args:
+        images: ``(n, rows, columns, 3)`` grey levels.
+        sigma: grey levels, zero or more.
+        seed: of the noise.
+
+    Returns:
+        The same shape, float64, not clipped.
+
+    Raises:
+        OutOfDomain: a sigma that is negative or not finite.
+    """
+    if not (np.isfinite(sigma) and sigma >= 0.0):
+        raise OutOfDomain(f"camera noise of {sigma!r} grey levels; give a finite number, zero or more")
+    noisy = np.array(images, dtype=np.float64)
+    for index, image in enumerate(noisy):
+        image += sigma * np.random.default_rng((seed, index)).standard_normal(image.shape)
+    return noisy

@@ -7,8 +7,7 @@ from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
 from harness.bench.sensor import TactileSensor
 from harness.sim.gel.gel import over_range
 from harness.sim.gel.height_map import rest_surface
-from harness.sim.optics.shadow import RIM, ShadowTable, cast_shadows, rim
-from harness.sim.optics.shadow_kernels import CHANNELS, lay_over, take, throw
+from harness.sim.optics.shadow import CHANNELS, RIM, ShadowTable, cast_shadows, lay_over, rim, take, throw
 from harness.sim.optics.tactile_calibration import Float32Array, TactileCalibration
 
 SOFTNESS = 59e-6

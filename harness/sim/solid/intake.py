@@ -10,8 +10,6 @@ from scipy.spatial import ConvexHull, QhullError
 
 from harness.basics.errors import MeshRefused, WrongUse
 from harness.basics.mesh import Mesh, signed_volume
-from harness.sim.solid.mesh_bodies import take_apart
-from harness.sim.solid.mesh_holes import fill_holes, join_bodies
 from harness.sim.solid.mesh_read import METRES, RawMesh, read_mesh
 from harness.sim.solid.mesh_repair import (
     RepairedSurface,
@@ -20,8 +18,11 @@ from harness.sim.solid.mesh_repair import (
     drop_duplicates,
     drop_flat,
     drop_specks,
+    fill_holes,
     is_watertight,
+    join_bodies,
     orient,
+    take_apart,
     weld,
 )
 

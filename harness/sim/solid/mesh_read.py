@@ -20,21 +20,21 @@ from harness.sim.solid.formats.collada import read_collada
 from harness.sim.solid.formats.gltf import read_gltf
 from harness.sim.solid.formats.nastran import read_nastran
 from harness.sim.solid.formats.parts import merge_parts
-from harness.sim.solid.formats.plain_file import plain_file
-from harness.sim.solid.formats.ply import read_ply
 from harness.sim.solid.formats.three_mf import read_3mf
-from harness.sim.solid.plain_formats import read_obj, read_off, read_stl
+from harness.sim.solid.plain_formats import plain_file, read_obj, read_off, read_ply, read_stl
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 """Metres in one unit of a mesh file, by the unit's name."""
 
 _PLAIN = {".obj": read_obj, ".stl": read_stl, ".stl_ascii": read_stl, ".off": read_off, ".ply": read_ply}
+
 DECLARING = {".glb": read_gltf, ".gltf": read_gltf, ".3mf": read_3mf, ".dae": read_collada}
 """Readers of the formats that declare units, axes or colours, by the endings of their files."""
 
 _OFTEN = "OBJ, STL, PLY, OFF, glTF, 3MF, COLLADA, or tetrahedra as Gmsh, VTK, Abaqus or Nastran write them"
 _OF_ELEMENTS = {".inp": read_abaqus, ".bdf": read_nastran, ".nas": read_nastran, ".fem": read_nastran}
 _TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+
 SOLIDS = ("hexahedron", "wedge", "pyramid", "tetra")
 """How meshio's names of solid cells begin."""
 

@@ -1,8 +1,13 @@
-"""Steps that turn a soup of triangles into a surface one can touch; each says what it did."""
+"""Steps that turn a soup of triangles into a surface one can touch; each says what it did.
+
+Solids that meet: at an edge or a point, each keeps a surface of its own; in a face, they are one.
+"""
 
 from dataclasses import dataclass, field
 
 import numpy as np
+from manifold3d import Error, Manifold
+from manifold3d import Mesh as ManifoldMesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 from scipy.spatial import cKDTree
@@ -15,6 +20,10 @@ _SPECK_SIZE, _SPECK_AREA = 0.03, 0.002
 _FLAT = 1e-12
 _MOST_PATCHES = 256
 _FEW = 0.05
+_LARGEST_HOLE = 0.08
+
+_SAME_ANGLE = 1e-6
+"""rad between two faces about their edge that lie on each other."""
 
 
 @dataclass
@@ -230,3 +239,151 @@ def _surrounds(outer: FloatArray, inner: FloatArray) -> int:
         return 0
     some = inner[:: max(1, len(inner) // 8), 0]
     return int(is_inside(np.ascontiguousarray(some), np.ascontiguousarray(outer)).all())
+
+
+def fill_holes(surface: RepairedSurface) -> None:
+    """Close holes whose box is under 8 % of the size with a fan about their middle.
+
+    Larger ones are mouths of vessels as often as damage: they stay.
+    """
+    filled, slits = 0, 0
+    for loop in _loops(boundary_edges(surface.faces)):
+        rim = surface.vertices[loop]
+        if float(np.ptp(rim, axis=0).max()) > _LARGEST_HOLE * surface.size:
+            continue
+        if _fan_area(rim) < 1e-3 * float(np.ptp(rim, axis=0).max()) ** 2:
+            slits += 1
+            continue
+        hub = len(surface.vertices)
+        surface.vertices = np.vstack([surface.vertices, rim.mean(axis=0)])
+        # The new faces run along the rim against its own faces.
+        fan = np.column_stack([np.roll(loop, -1), loop, np.full(len(loop), hub)])
+        surface.faces = np.vstack([surface.faces, fan])
+        filled += 1
+    if filled:
+        surface.repairs.append(f"filled {filled} small holes")
+    if slits:
+        surface.repairs.append(f"left {slits} slits without width")
+
+
+def join_bodies(surface: RepairedSurface) -> int:
+    """Unite closed bodies that overlap, so that no face lies inside the material.
+
+    Returns:
+        The number of separate bodies afterwards.
+    """
+    body = bodies(surface)
+    count = int(body.max()) + 1
+    if count == 1 or not is_watertight(surface.faces):
+        return count
+    # Seen from a vertex: a solid's coordinates are float32.
+    centre = surface.vertices[0].copy()
+    parts = [_solid(surface.vertices - centre, surface.faces[body == k]) for k in range(count)]
+    # A wall of a cavity is a body of negative volume: only whole solids can be united.
+    if any(part.status() != Error.NoError or part.volume() <= 0.0 for part in parts):
+        return count
+    joined = sum(parts[1:], parts[0])
+    after = len(joined.decompose())
+    if after == count and joined.num_tri() == len(surface.faces):
+        return count
+    raw = joined.to_mesh64()
+    surface.vertices = np.asarray(raw.vert_properties, np.float64)[:, :3] + centre
+    surface.faces = np.asarray(raw.tri_verts, np.int64)
+    surface.repairs.append(f"joined {count} overlapping bodies into {after}")
+    return after
+
+
+def _solid(vertices: FloatArray, faces: IntArray) -> Manifold:
+    used, inverse = np.unique(faces, return_inverse=True)
+    return Manifold(
+        ManifoldMesh(vertices[used].astype(np.float32), inverse.reshape(-1, 3).astype(np.uint32)),
+    )
+
+
+def _loops(edges: IntArray) -> list[IntArray]:
+    """Closed walks along directed boundary edges; places where two rims touch are left alone."""
+    starts, times = np.unique(edges[:, 0], return_counts=True)
+    following = {int(a): int(b) for a, b in edges}
+    forked = set(starts[times > 1].tolist())
+    loops = []
+    while following:
+        walk = [next(iter(following))]
+        while (step := following.pop(walk[-1], None)) is not None and step != walk[0]:
+            walk.append(step)
+        if step == walk[0] and len(walk) >= 3 and not forked.intersection(walk):
+            loops.append(np.array(walk, dtype=np.int64))
+    return loops
+
+
+def _fan_area(rim: FloatArray) -> float:
+    middle = rim.mean(axis=0)
+    return float(
+        0.5 * np.linalg.norm(np.cross(rim - middle, np.roll(rim, -1, axis=0) - middle), axis=1).sum()
+    )
+
+
+def take_apart(surface: RepairedSurface) -> None:
+    """Give solids that touch in an edge, a point or a face a surface each, where each is closed by itself.
+
+    Around an edge of more than two faces those are neighbours that have material between them, by the way
+    that the file's faces turn. Where that does not make closed solids, nothing is changed.
+    """
+    solid = _solids(surface)
+    count = int(solid.max()) + 1
+    if count == int(bodies(surface).max()) + 1:
+        return
+    if any(len(boundary_edges(surface.faces[solid == k])) for k in range(count)):
+        return
+    keys = solid[:, None] * len(surface.vertices) + surface.faces
+    used, faces = np.unique(keys, return_inverse=True)
+    surface.vertices = surface.vertices[used % len(surface.vertices)]
+    surface.faces = faces.reshape(-1, 3).astype(np.int64)
+    surface.repairs.append(f"took {count} solids apart that meet in an edge, a point or a face")
+
+
+def _solids(surface: RepairedSurface) -> IntArray:
+    """``(m,)``: which solid each face bounds, from 0."""
+    faces, count = surface.faces, len(surface.faces)
+    directed = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    forward = directed[:, 0] < directed[:, 1]
+    _, edge = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)
+    owner, order = np.tile(np.arange(count), 3), np.argsort(edge.ravel(), kind="stable")
+    starts = np.flatnonzero(np.r_[True, np.diff(edge.ravel()[order]) > 0, True])
+    lengths = np.diff(starts)
+    plain = order[starts[:-1][lengths == 2]], order[starts[:-1][lengths == 2] + 1]
+    pairs = [np.column_stack([owner[plain[0]], owner[plain[1]]])]
+    for start, length in zip(starts[:-1][lengths > 2], lengths[lengths > 2], strict=True):
+        around = order[start : start + length]
+        joined = _with_material_between(_angles(surface, directed[around[0]], owner[around]), forward[around])
+        pairs.append(owner[around][joined])
+    joined_faces = np.concatenate(pairs)
+    graph = coo_array((np.ones(len(joined_faces)), tuple(joined_faces.T)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _angles(surface: RepairedSurface, edge: IntArray, around: IntArray) -> FloatArray:
+    """``(k,)`` in steps of ``_SAME_ANGLE``: where faces stand about their edge, lesser vertex to greater."""
+    start, end = surface.vertices[edge.min()], surface.vertices[edge.max()]
+    along = (end - start) / np.linalg.norm(end - start)
+    corners = surface.faces[around]
+    third = corners[(corners != edge[0]) & (corners != edge[1])]
+    arms = surface.vertices[third] - start
+    arms = arms - (arms @ along)[:, None] * along
+    across = np.cross(along, arms[0])
+    angles = np.arctan2(arms @ across, np.linalg.norm(arms[0]) * (arms @ arms[0]))
+    steps = np.round(2.0 * np.pi / _SAME_ANGLE)
+    return np.asarray(np.round(angles / _SAME_ANGLE) % steps)
+
+
+def _with_material_between(angles: FloatArray, forward: BoolArray) -> IntArray:
+    """``(p, 2)`` of faces about an edge, those that bound one material; none where they do not take turns.
+
+    A face that runs forward along the edge has its material before it, one that runs backward behind it.
+    """
+    # Of two faces that lie on each other the one that ends material comes first.
+    order = np.lexsort((~forward, angles))
+    ends = forward[order]
+    if len(order) % 2 or (ends == np.roll(ends, 1)).any():
+        return np.zeros((0, 2), dtype=np.int64)
+    begins = np.flatnonzero(~ends)
+    return np.column_stack([order[begins], order[(begins + 1) % len(order)]])

@@ -5,8 +5,10 @@ A file that was cut short is refused here, where it can still be told from one t
 
 import io
 import re
+import tempfile
 from array import array
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -16,7 +18,7 @@ import numpy as np
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused
 from harness.basics.files.foreign_file import MOST_DATA, read_bounded
-from harness.basics.files.text_file import plain_bytes, read_text_bytes, unpack
+from harness.basics.files.text_file import GZIP, plain_bytes, read_text_bytes, unpack
 from harness.sim.solid.polygons import triangulated
 from harness.sim.solid.text_numbers import (
     MAX_ELEMENTS,
@@ -32,6 +34,7 @@ _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attri
 _VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _STL_WORDS = (rb"^\s*solid\b", rb"^\s*endsolid\b", rb"\bfacet\s+normal", rb"\bendfacet\b")
 _OFF_KINDS = frozenset({b"OFF", b"COFF", b"NOFF", b"CNOFF"})
+
 _OBJ_SHAPES = frozenset({b"surf", b"curv", b"bzp", b"bsp", b"cdp", b"cdc", b"res", b"call", b"csh"})
 """Statements of an OBJ that hold shape in another way than faces do: free-form surfaces, and other files."""
 
@@ -43,6 +46,14 @@ _MAX_LINES = 3 * MAX_ELEMENTS
 
 _WEIGHTED = 5
 """Words of a vertex statement that ends with a weight."""
+
+_HEADER = 2**16
+"""Bytes in which the header ends."""
+
+_SINGLE = (b"float", b"float32")
+
+_COUNTS = re.compile(rb"\$(?:Nodes|Elements)[ \t\r]*\n[ \t]*(\d{1,20})(?:[ \t]+(\d{1,20}))?")
+"""Numbers of blocks and of nodes or elements that a Gmsh file announces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,3 +305,83 @@ def _binary_stl(data: bytes, name: str) -> PlainMesh:
     facets = np.frombuffer(data, _STL_FACET, count, _STL_HEADER)
     places = facets["corners"].reshape(-1, 3).astype(np.float64)
     return PlainMesh(places, np.arange(len(places), dtype=np.int64).reshape(-1, 3), notes, single=True)
+
+
+def read_ply(path: Path) -> PlainMesh:
+    """Read the faces of a PLY; polygons are split, colours and normals are left out.
+
+    Raises:
+        MeshRefused: cut short, too large, or with a word that is not a number.
+    """
+    import trimesh
+
+    data = unpack(read_bounded(path, "a PLY", MOST_DATA, MeshRefused), path, "a PLY", MOST_DATA, MeshRefused)
+    plain = plain_bytes(data[:_HEADER], path)
+    header = [line.split() for line in plain.partition(b"end_header")[0].split(b"\n")]
+    is_text = [b"format", b"ascii"] in [words[:2] for words in header]
+    if is_text:
+        data = plain_bytes(data, path, MeshRefused)
+        _check_text(data, path.name)
+    counts = [int(words[2]) for words in header if words[:1] == [b"element"] and len(words) == 3]
+    require_few(max(counts, default=0), "vertices or faces", path.name)
+    lines = data.count(b"\n") + 1
+    if is_text and sum(counts) > lines:
+        raise MeshRefused(
+            f"{path.name} is cut short: it announces {sum(counts)} vertices and faces, and has {lines} lines;"
+            " export it again"
+        )
+    loaded = trimesh.load_scene(
+        io.BytesIO(data), file_type="ply", process=False, skip_materials=True, maintain_order=True
+    )
+    if not loaded.geometry:
+        raise MeshRefused(f"{path.name} holds no triangle; export a surface")
+    mesh = loaded.to_mesh()
+    single = any(
+        words[:1] == [b"property"] and words[1] in _SINGLE and words[2:] == [b"x"] for words in header
+    )
+    vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+    return PlainMesh(vertices, faces, single=single and not is_text)
+
+
+def _check_text(data: bytes, name: str) -> None:
+    """Refuse lines that the library would read in part: it stops at the first word that is not a number."""
+    require_few(data.count(b"\n") // 2, "vertices or faces", name)
+    start = data.find(b"end_header")
+    comma = data.find(b",", max(start, 0))
+    if comma >= 0:
+        line = data.count(b"\n", 0, comma) + 1
+        words = data[data.rfind(b"\n", 0, comma) + 1 : data.find(b"\n", comma)].split()
+        raise refuse_number(words, name, line, "numbers")
+
+
+def _check_counts(data: bytes, name: str) -> None:
+    """Refuse a file of Gmsh that announces more than its bytes can hold: the library makes room for all."""
+    for found in _COUNTS.finditer(data):
+        announced = max(int(count) for count in found.groups(b"0"))
+        if announced > len(data):
+            raise MeshRefused(
+                f"{name} is cut short: it announces {announced} nodes or elements in {len(data)} bytes; "
+                "export it again"
+            )
+
+
+@contextmanager
+def plain_file(path: Path) -> Iterator[Path]:
+    """Yield the path of a file that holds the same text as UTF-8 with LF line ends; binary files stay.
+
+    Raises:
+        MeshRefused: damaged compression or encoding, or too large.
+    """
+    data = read_bounded(path, "a mesh", MOST_DATA, MeshRefused)
+    packed = data.startswith(GZIP)
+    plain = unpack(data, path, "a mesh", MOST_DATA, MeshRefused)
+    text = plain_bytes(plain, path, MeshRefused)
+    plain = plain if b"\0" in text else text
+    _check_counts(plain, path.name)
+    if not packed and plain == data:
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="touchstone-text-") as folder:
+        copy = Path(folder) / (path.name[: -len(".gz")] if path.name.lower().endswith(".gz") else path.name)
+        copy.write_bytes(plain)
+        yield copy

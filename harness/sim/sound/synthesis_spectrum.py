@@ -16,7 +16,7 @@ from scipy.fft import next_fast_len
 
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, read_only
 from harness.basics.compiled import compiled
-from harness.sim.sound.synthesis_memory import MEMORY
+from harness.sim.sound.synthesis_kernels import MEMORY
 
 STRETCH = 16_500
 """Samples of one transform, about: an eighth of three seconds."""

@@ -13,8 +13,7 @@ import numpy as np
 from scipy.linalg.blas import dgemm, sgemm
 
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from harness.sim.sound.synthesis_kernels import TILE, block_counts, fill, largest_rest
-from harness.sim.sound.synthesis_memory import MEMORY
+from harness.sim.sound.synthesis_kernels import MEMORY, TILE, block_counts, fill, largest_rest
 from harness.sim.sound.synthesis_spectrum import add_modes, may_be_added
 
 TableLevel = Literal["fast", "double"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.effects.explain_networks import NetworkInUse
+from harness.effects.explain import NetworkInUse
 from harness.report.data import AnswerRow, ReportData, StrikeLine
 from harness.report.page import write_report
 from harness.report.values import Missing

@@ -3,15 +3,33 @@
 Where nothing touches the gel, ``picture = gain * reference + offset`` in each channel. A contact changes the
 other pixels by any amount, so the light is the model that explains most blocks of the picture closely, and
 not the fit with the least squares. Of several models the simplest one that explains as many blocks is used.
+
+Whether a change of colour is that of a pressed gel: by the linear part of the calibration's shading.
+
+Read through it, the colours of a press are the gradient of one surface that rises from its rest. Colours of
+exchanged channels leave a remainder that no slope explains; a mirrored picture gives slopes that are no
+surface's gradient; one turned by half a turn, or less its own press, gives a gel that was pulled out.
+
+Whether a press has its channels exchanged or its picture turned, by what explains it better.
+
+A surface of the gel and the resting gel explain a press as it is. Where one of the other orders of channels
+and orientations explains it far better, the picture is in that one. Contacts that fill the window, or are
+steeper than the linear shading, are explained badly as they are, and worse in every other way.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import islice, permutations
 
 import numpy as np
+from scipy.ndimage import label
 
-from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
+from harness.sim.optics.lit_calibration import place_terms
+from harness.sim.optics.poisson import free_heights
+from harness.sim.optics.shading import POSITION_TERMS, design, scaled_position
+from harness.sim.optics.tactile_calibration import TactileCalibration
 
 CLOSE = 1.0
 """Grey levels, length over the channels, within which a block is explained. The noise of a block is 0.6."""
@@ -23,6 +41,7 @@ _WIDEST = 4.0
 """Multiple of the close limit at which a fit starts."""
 
 _ITERATIONS = 8
+
 _PROPOSALS = 250
 """Blocks whose own change is tried as the light of the picture."""
 
@@ -34,6 +53,58 @@ MIN_EXPLAINED = 0.08
 
 _MIN_EXPLAINED_UNEVEN = 0.5
 _CHANNELS = ("red", "green", "blue")
+
+_COARSER = 2
+"""Blocks of the check averaged each way: a surface is told from none by its large parts."""
+
+_FAR_BETTER = 0.8
+"""Of the residual as it is: right presses have at least 1.4 in any other way, turned ones at most 0.6."""
+
+_LITTLE, _LITTLE_SHARE = 6.0, 0.35
+"""Grey levels, and share of the change, left unexplained by a press that needs no second look."""
+
+_AS_GOOD = 1.1
+"""Times the least residual: ways that cannot be told apart."""
+
+_NO_MORE = 1.1
+"""Times a press's change: a way in which the press differs by more from the rest than this is none."""
+
+_UNCHANGED = 4.0
+"""Grey levels within which a block is at rest."""
+
+_STILL = 0.25
+"""Share of a picture that is taken to be at rest."""
+
+_OWN = np.arange(3)
+"""Channels in their own order."""
+
+_RIDGE = 16.0
+
+_SHARE = 0.7
+"""Of the slope limit, over which colours are made linear."""
+
+_STRONG, _QUIET = 12.0, 6.0
+"""Grey levels, length over the channels, of a block that a contact changed, and of one at rest."""
+
+_LEAST_BLOCKS = 12
+_MOST_OF_EDGE = 0.7
+_STEEPEST = 0.8
+
+
+@dataclass(frozen=True)
+class SlopeFit:
+    """How well a change of colour is explained as a pressed gel's.
+
+    Attributes:
+        explained: share of the change, in grey levels squared, that slopes explain.
+        surface: share of those slopes, squared, that are one surface's gradient.
+        raised: -1 to 1: mean height of the changed blocks above the rest, over the mean of its size; 0 where
+            the rest does not go around the contact.
+    """
+
+    explained: float
+    surface: float
+    raised: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,3 +280,168 @@ def channel_orders(back: bool = False) -> list[tuple[str, IntArray]]:
 def in_words(exchanged: str, turned: str) -> str:
     """Join the words for an order of channels and for an orientation; empty for neither."""
     return ", ".join(part for part in (exchanged, turned) if part)
+
+
+def without_drift(change: FloatArray) -> FloatArray:
+    """A change of colour less what its least changed quarter has in common, the light of the moment.
+
+    Args:
+        change: ``(rows, columns, 3)`` grey levels, means over blocks.
+    """
+    size = np.abs(change).max(axis=2)
+    if (size < _UNCHANGED).mean() > _STILL:
+        return change
+    still = size <= np.percentile(size, 100.0 * _STILL)
+    return np.asarray(change - np.median(change[still], axis=0))
+
+
+def better_turned(
+    seen: FloatArray, rest: FloatArray, calibration: TactileCalibration, block: int
+) -> tuple[str, float, float] | None:
+    """The order of channels and orientation that explain a press far better than it is; None for none.
+
+    Args:
+        seen: ``(rows, columns, 3)`` grey levels, means over blocks.
+        rest: the same, of the untouched gel in the same light.
+        calibration: with a smooth model.
+        block: pixels a side of a block.
+
+    Returns:
+        In words, with the grey levels rms left unexplained in it and as it is.
+    """
+    own, coarse = _COARSER * block, block_means(rest, _COARSER)
+    picture = block_means(seen, _COARSER)
+    size, left = _size(picture - coarse), surface_residual(without_drift(picture - coarse), calibration, own)
+    if left < min(_LITTLE, _LITTLE_SHARE * size):
+        return None
+    ways = {
+        words: surface_residual(without_drift(other - coarse), calibration, own)
+        for words, other in _nearer(picture, coarse, _NO_MORE * size)
+    }
+    least = min(ways.values(), default=np.inf)
+    if least >= _FAR_BETTER * left:
+        return None
+    # On an evenly lit gel half a turn more explains as much; the plainest comes first.
+    words = next(words for words, one in ways.items() if one < _AS_GOOD * least)
+    return words, ways[words], left
+
+
+def _nearer(picture: FloatArray, rest: FloatArray, limit: float) -> list[tuple[str, FloatArray]]:
+    """The picture in every other way, in words, in which it is by less than ``limit`` from the rest.
+
+    ``_size`` of the difference, by products of channels, which all orders of an orientation share.
+    """
+    count, every, orders = picture.size / 3, turns(picture, back=True), channel_orders(back=True)
+    taken = np.array([channels for _, channels in orders])
+    products = np.stack([np.einsum("ijc,ijd->cd", one, rest) for one in every.values()])
+    moved = picture.mean(axis=(0, 1))[taken] - rest.mean(axis=(0, 1))
+    apart = np.vdot(picture, picture) + np.vdot(rest, rest) - 2.0 * products[:, taken, _OWN].sum(axis=2)
+    near = apart / count - (moved**2).sum(axis=1) < limit**2  # (orientations, orders)
+    return [
+        (in_words(exchanged, words), one[..., channels])
+        for k, (exchanged, channels) in enumerate(orders)
+        for t, (words, one) in enumerate(every.items())
+        if near[t, k] and (exchanged or words)
+    ]
+
+
+def _size(change: FloatArray) -> float:
+    """Grey levels rms of a change, but for what all of it has in common."""
+    count = change.size / 3
+    mean = np.einsum("ijc->c", change) / count
+    return float(np.sqrt(max(np.einsum("ijc,ijc->", change, change) / count - mean @ mean, 0.0)))
+
+
+def slope_fit(change: FloatArray, calibration: TactileCalibration, block: int) -> SlopeFit | None:
+    """Explain a change of colour; None where too little changed to say, or only a table is known.
+
+    Args:
+        change: ``(rows, columns, 3)`` grey levels against the untouched gel, means over blocks.
+        calibration: whose smooth model is asked.
+        block: pixels a side of a block.
+    """
+    size = np.einsum("ijc,ijc->ij", change, change)
+    strong = size > _STRONG**2
+    if strong.sum() < _LEAST_BLOCKS or len(calibration.smooth) == 0:
+        return None
+    shading, inverse = linear_shading(calibration, block)
+    normal = np.einsum("ijac,ijc->ija", inverse, change)
+    apart = change - np.einsum("ijac,ija->ijc", shading, normal)
+    explained = 1.0 - float((apart[strong] ** 2).sum() / size[strong].sum())
+    slopes = _slopes(normal)
+    slopes[size < _QUIET**2] = 0.0
+    heights = free_heights(slopes[..., 1], slopes[..., 0])
+    down, right = np.gradient(heights)
+    curled = (right - slopes[..., 0]) ** 2 + (down - slopes[..., 1]) ** 2
+    whole = float((slopes[strong] ** 2).sum())
+    surface = 1.0 - float(curled[strong].sum()) / max(whole, 1e-12)
+    rest = _around(size < _QUIET**2)
+    if rest is None:
+        return SlopeFit(explained, surface, 0.0)
+    above = heights[strong] - float(heights[rest].mean())
+    return SlopeFit(explained, surface, float(above.mean() / max(float(np.abs(above).mean()), 1e-12)))
+
+
+def surface_residual(change: FloatArray, calibration: TactileCalibration, block: int) -> float:
+    """Grey levels rms of a change of colour that is not that of one surface of the gel.
+
+    Args:
+        change: ``(rows, columns, 3)`` grey levels against the untouched gel, means over blocks.
+        calibration: with a smooth model.
+        block: pixels a side of a block.
+    """
+    shading, inverse = linear_shading(calibration, block)
+    slopes = _slopes(np.einsum("ijac,ijc->ija", inverse, change))
+    down, right = np.gradient(free_heights(slopes[..., 1], slopes[..., 0]))
+    normal = -np.stack([right, down], axis=-1) / np.sqrt(1.0 + right**2 + down**2)[..., None]
+    apart = change - np.einsum("ijac,ija->ijc", shading, normal)
+    return float(np.sqrt((apart**2).sum(axis=2).mean()))
+
+
+def _slopes(normal: FloatArray) -> FloatArray:
+    sine = np.hypot(normal[..., 0], normal[..., 1])
+    held = normal * np.minimum(1.0, _STEEPEST / np.maximum(sine, 1e-9))[..., None]
+    return np.asarray(-held / np.sqrt(1.0 - (held**2).sum(axis=2, keepdims=True)))
+
+
+def _around(quiet: BoolArray) -> BoolArray | None:
+    """The quiet region that makes up most of the picture's edge; None where none does.
+
+    Flat parts of a contact are quiet too, and higher than the rest: beside one that leaves the picture either
+    may be the rest.
+    """
+    labels, count = label(quiet)
+    edge = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    shares = np.bincount(edge, minlength=count + 1)[1:] / len(edge)
+    if count == 0 or shares.max() < _MOST_OF_EDGE:
+        return None
+    return np.asarray(labels == 1 + int(shares.argmax()))
+
+
+@lru_cache(maxsize=8)
+def linear_shading(calibration: TactileCalibration, block: int) -> tuple[FloatArray, FloatArray]:
+    """The calibration's smooth model made linear, at the middles of blocks.
+
+    Returns:
+        ``(rows, columns, 2, 3)`` colours of a normal by block, and the normal of a colour.
+    """
+    rows, columns = calibration.rows, calibration.columns
+    by_place = np.einsum(
+        "an,npc->apc",
+        _linear_terms(_SHARE * calibration.header.slope_limit),
+        calibration.smooth.reshape(-1, POSITION_TERMS, 3),
+    )
+    y, x = np.mgrid[: rows // block, : columns // block] * float(block) + 0.5 * (block - 1)
+    places = place_terms(scaled_position(x.ravel(), y.ravel(), rows, columns))
+    shading = np.einsum("np,apc->nac", places, by_place).reshape(*x.shape, 2, 3)
+    gram = np.einsum("ijac,ijbc->ijab", shading, shading) + _RIDGE * np.eye(2)
+    return read_only(shading), read_only(np.linalg.solve(gram, shading))
+
+
+def _linear_terms(limit: float) -> FloatArray:
+    """``(2, 20)``: least squares of the smooth model's terms by the normal alone, over a disc."""
+    axis = np.linspace(-limit, limit, 15)
+    normal = np.stack([one.ravel() for one in np.meshgrid(axis, axis)], axis=1)
+    normal = normal[np.hypot(normal[:, 0], normal[:, 1]) <= limit]
+    terms = design(normal, np.zeros_like(normal))[:, ::POSITION_TERMS]
+    return np.asarray(np.linalg.lstsq(normal, terms, rcond=None)[0])

@@ -1,14 +1,54 @@
 """Household shapes drawn at random: of what a regression and networks learn, and on what they are tested."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
+from harness.basics.arrays import FloatArray, IntArray
 from harness.sim.solid.household.solid_grid import HouseholdSolid, SolidGrid
-from harness.sim.solid.household.vessel import Cross, Vessel, add_arm, add_handle, offset, turned
 
 _Random = np.random.Generator
+
+AROUND = 24
+"""Cells about the axis."""
+
+LENGTH = 0.11
+"""Of a cell along the section, in units of its greatest radius or height."""
+
+_FEWEST = 2
+"""Cells along a straight piece of the section, so that a tube finds room on a low wall."""
+
+Outline = Sequence[tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Cross:
+    """The horizontal section of a vessel: a superellipse.
+
+    Attributes:
+        across: its extent in y over that in x.
+        power: 2 is an ellipse; greater is nearer to a rectangle.
+    """
+
+    across: float = 1.0
+    power: float = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Vessel:
+    """A vessel's grid.
+
+    Attributes:
+        grid: that it is part of.
+        outside: ``(s, AROUND)`` nodes of its outer face, from the middle of the bottom up to the rim.
+        split: row of ``outside`` above which cells run up, and below which they run down.
+    """
+
+    grid: SolidGrid
+    outside: IntArray
+    split: int
 
 
 def draw(family: str, random: _Random) -> HouseholdSolid:
@@ -165,3 +205,129 @@ FAMILIES: MappingProxyType[str, Callable[[_Random], HouseholdSolid]] = MappingPr
     }
 )  # fmt: skip
 """By name."""
+
+
+def offset(outline: Outline, wall: float) -> list[tuple[float, float]]:
+    """The inner side of a wall whose outer side is a line of radii and heights, mitred at its corners."""
+    places = np.array(outline)
+    along = np.diff(places, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    inward = np.column_stack([-along[:, 1], along[:, 0]])
+    before, after = np.vstack([inward[:1], inward]), np.vstack([inward, inward[-1:]])
+    mitre = (before + after) / (1.0 + np.einsum("ij,ij->i", before, after))[:, None]
+    inner = places + wall * mitre
+    inner[:, 0] = np.maximum(inner[:, 0], 0.0)
+    return [(float(radius), float(height)) for radius, height in inner]
+
+
+def turned(
+    grid: SolidGrid, outer: Outline, inner: Outline, split_height: float, cross: Cross | None = None
+) -> Vessel:
+    """Add the body between two lines of radii and heights of equal length, turned about the vertical.
+
+    Args:
+        grid: to add to.
+        outer: its outer side, from the bottom up.
+        inner: its inner side, point by point.
+        split_height: above it cells run up, below it down, so that both ends of a handle fit.
+        cross: horizontal section; a circle where not given.
+    """
+    cross = cross or Cross()
+    outside, inside = _divided(np.array(outer), np.array(inner))
+    angles = np.arange(AROUND) * 2.0 * np.pi / AROUND
+    way = np.column_stack([np.cos(angles), np.sin(angles)])
+    way /= (np.abs(way) ** cross.power).sum(axis=1, keepdims=True) ** (1.0 / cross.power)
+    way = way * np.array([1.0, cross.across])
+    numbers = np.stack([_ring(grid, side, way) for side in (inside, outside)], axis=2)
+    around = np.concatenate([numbers, numbers[:, :1]], axis=1)
+    split = int(np.clip(np.searchsorted(outside[:, 1], split_height), 1, len(outside) - 2))
+    grid.add_block(around[split:])
+    grid.add_block(around[split::-1])
+    return Vessel(grid, numbers[:, :, 1], split)
+
+
+def _divided(outer: FloatArray, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Both lines with so many points that no cell is much longer than ``LENGTH`` of the whole."""
+    lengths = np.linalg.norm(np.diff(outer, axis=0), axis=1)
+    counts = np.maximum(_FEWEST, np.round(lengths / (LENGTH * outer.max()))).astype(int)
+    share = np.concatenate(
+        [k + np.arange(count) / count for k, count in enumerate(counts)] + [np.array([len(counts)])]
+    )
+    at = np.arange(len(outer))
+    first, second = (
+        np.column_stack([np.interp(share, at, line[:, axis]) for axis in (0, 1)]) for line in (outer, inner)
+    )
+    return first, second
+
+
+def _ring(grid: SolidGrid, line: FloatArray, way: FloatArray) -> IntArray:
+    """``(s, AROUND)`` nodes; on the axis all around are one."""
+    flat = line[:, None, :1] * way[None]
+    height = np.broadcast_to(line[:, None, 1:], (*flat.shape[:2], 1))
+    numbers = grid.add_nodes(np.concatenate([flat, height], axis=2))
+    on_axis = line[:, 0] <= 0.0
+    return np.where(on_axis[:, None], numbers[:, :1], numbers)
+
+
+def _row_at(vessel: Vessel, height: float) -> int:
+    """Of the outer face, the row below which a tube of two cells begins."""
+    heights = vessel.grid.places(vessel.outside[:, 0])[:, 2]
+    return int(np.clip(np.abs(heights - height).argmin() - 1, 1, len(heights) - 3))
+
+
+def _patch(vessel: Vessel, row: int, column: int) -> IntArray:
+    """``(3, 3)`` nodes of two by two cells of the outer face, about a column."""
+    columns = (column + np.arange(-1, 2)) % AROUND
+    return np.asarray(vessel.outside[row : row + 3][:, columns])
+
+
+def add_handle(vessel: Vessel, high: float, low: float, reach: float, thick: float) -> None:
+    """A loop on the side of x, out to a distance from the axis, between two heights."""
+    top = _row_at(vessel, high)
+    bottom = min(_row_at(vessel, low), vessel.split - 2)
+    if bottom < 1 or top < vessel.split:
+        return
+    first, last = _patch(vessel, top, 0), _patch(vessel, bottom, 0)[::-1]
+    a, b = (vessel.grid.places(patch).mean(axis=(0, 1)) for patch in (first, last))
+    out = np.array([reach - 0.5 * thick, 0.0, 0.0])
+    corner = [np.array([out[0], 0.0, end[2] + lift]) for end, lift in ((a, -0.5 * thick), (b, 0.5 * thick))]
+    _tube(vessel.grid, first, last, np.array([a, *corner, b]), thick)
+
+
+def add_arm(
+    vessel: Vessel, height: float, end: tuple[float, float], thick: float, opposite: bool = False
+) -> None:
+    """A straight bar from the wall to a distance from the axis and a height; a spout or a pan's handle."""
+    row = max(_row_at(vessel, height), vessel.split)
+    if row > len(vessel.outside) - 3:
+        return
+    column = AROUND // 2 if opposite else 0
+    first = _patch(vessel, row, column)
+    begin = vessel.grid.places(first).mean(axis=(0, 1))
+    side = -1.0 if opposite else 1.0
+    _tube(vessel.grid, first, None, np.array([begin, [side * end[0], 0.0, end[1]]]), thick)
+
+
+def _tube(grid: SolidGrid, first: IntArray, last: IntArray | None, corners: FloatArray, thick: float) -> None:
+    """Cells along a line in the plane of x and z, from nodes that are there, to such or to a free end."""
+    length = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    at = np.append(0.0, np.cumsum(length))
+    count = max(3, int(np.ceil(at[-1] / max(thick, 0.08 * at[-1]))))
+    stations = np.linspace(0.0, at[-1], count + 1)
+    middle = np.column_stack([np.interp(stations, at, corners[:, axis]) for axis in range(3)])
+    along = np.gradient(middle, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    # What is up at the beginning turns with the line.
+    side = np.sign(along[0, 0]) or 1.0
+    up = np.column_stack([-along[:, 2] * side, np.zeros(len(along)), along[:, 0] * side])
+    across = grid.places(first)[:, :, 1]
+    wide = np.sign(across[1, 2] - across[1, 0]) * np.linspace(-0.5, 0.5, 3) * thick
+    rows = np.linspace(-0.5, 0.5, 3) * thick
+    layers = [first]
+    free = range(1, count) if last is not None else range(1, count + 1)
+    for k in free:
+        places = middle[k] + rows[:, None, None] * up[k] + wide[None, :, None] * np.array([0.0, 1.0, 0.0])
+        layers.append(grid.add_nodes(places))
+    if last is not None:
+        layers.append(last)
+    grid.add_block(np.stack(layers))

@@ -17,9 +17,8 @@ from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.touch.graph import PatchCodes, codes_graph
 from harness.objectfile.touch.nodes import signatures
 from harness.objectfile.touch.skirt import blur_matrix
-from harness.sim.gel.gel import deform, half_kernel
+from harness.sim.gel.gel import blur, deform, half_kernel
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.gel.kernels import blur
 from harness.sim.gel.presses import Presses
 from tests.samples import touch_bench as tb
 

@@ -11,7 +11,7 @@ from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import OutOfDomain
 from harness.bench.sensor import GELSIGHT_R15
 from harness.cli import invoke
-from harness.effects.reading_force import read_force
+from harness.effects.force_effects import read_force
 from harness.picture.image_file import write_png
 from harness.sim.gel.contact_force import contact_force
 from harness.sim.gel.elastic import GelElastic

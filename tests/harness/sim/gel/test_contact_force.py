@@ -7,10 +7,8 @@ from hypothesis import strategies as st
 from scipy.signal import fftconvolve
 
 from harness.basics.arrays import FloatArray
-from harness.sim.gel.contact_force import PARTS, ForceLevel, contact_force
-from harness.sim.gel.contact_pressure import SETTLED, contact_pressure
-from harness.sim.gel.elastic import GelElastic
-from harness.sim.gel.layer_compliance import influence
+from harness.sim.gel.contact_force import PARTS, SETTLED, ForceLevel, contact_force, contact_pressure
+from harness.sim.gel.elastic import GelElastic, influence
 from tests.oracles.layer_oracle import ball_force, flat_force
 from tests.samples.pressed_shapes import paraboloid, punch
 

@@ -5,9 +5,8 @@ import pytest
 from scipy.integrate import dblquad
 
 from harness.basics.arrays import FloatArray
-from harness.sim.gel.elastic import GelElastic
-from harness.sim.gel.layer_compliance import disc_stiffness, influence, taken_back
-from harness.sim.gel.marker_kernel import layer_response
+from harness.sim.gel.elastic import GelElastic, disc_stiffness, influence, taken_back
+from harness.sim.gel.markers import layer_response
 
 WAVES = np.geomspace(1e-3, 30.0, 200)
 

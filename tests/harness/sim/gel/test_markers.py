@@ -12,8 +12,13 @@ from hypothesis import strategies as st
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, OutOfDomain, WrongUse
 from harness.bench.sensor import GELSIGHT_R15, MarkerGrid
-from harness.sim.gel.marker_kernel import layer_kernel, layer_response
-from harness.sim.gel.markers import draw_markers, marker_displacements, rest_markers
+from harness.sim.gel.markers import (
+    draw_markers,
+    layer_kernel,
+    layer_response,
+    marker_displacements,
+    rest_markers,
+)
 from tests.oracles.marker_tensors import TensorMap, fit_tensors, tensor_map
 
 DOTTED = replace(GELSIGHT_R15, markers=MarkerGrid(7, 9, 2e-3, 0.4e-3))

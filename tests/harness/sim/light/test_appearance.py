@@ -8,12 +8,10 @@ import pytest
 
 from harness.basics.arrays import ByteArray
 from harness.basics.errors import DataRefused, MeshRefused, OutOfDomain, WrongUse
-from harness.objects.albedo import COLOURS
 from harness.objects.builtin import MATERIALS, build
 from harness.picture.srgb import LINEAR_OF_BYTE
 from harness.sim.light.appearance import Appearance, plain, smooth_normals
-from harness.sim.light.appearance_read import read_appearance
-from harness.sim.light.appearance_source import appearance_of, builtin_appearance
+from harness.sim.light.appearance_source import COLOURS, appearance_of, builtin_appearance, read_appearance
 from tests.oracles.seen_shapes import ball, cuboid, square
 
 FACES = np.array([0, 1, 0, 1])

@@ -10,8 +10,7 @@ from harness.basics.mesh import Mesh
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import plain
 from harness.sim.light.appearance_source import builtin_appearance
-from harness.sim.light.direct_image import LitObject
-from harness.sim.light.pixel_places import pixel_places
+from harness.sim.light.direct_image import LitObject, pixel_places
 from tests.oracles.seen_shapes import ball, cuboid, square, together
 
 UP = (0.0, 0.0, 1.0)

@@ -5,7 +5,7 @@ import pytest
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import OutOfDomain
-from harness.sim.light.pixel_places import MOST_SAMPLES, pixel_places, quarter_counts
+from harness.sim.light.direct_image import MOST_SAMPLES, pixel_places, quarter_counts
 
 SIDES = (1, 2, 3, 4, 5, 8, 12, 16)
 

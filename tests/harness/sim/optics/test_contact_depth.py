@@ -11,8 +11,7 @@ from calibration.taxim.pictures import Pictures, read_pictures
 from harness.basics.arrays import ByteArray, FloatArray, block_means
 from harness.basics.errors import CalibrationRefused, DataRefused
 from harness.sim.gel.gel import R15_SKIRT, deform
-from harness.sim.optics.contact_colour import contact_colour
-from harness.sim.optics.contact_depth import drift_of, read_depth
+from harness.sim.optics.contact_depth import contact_colour, drift_of, read_depth
 from harness.sim.optics.inverse import DRIFTING, STEADY, invert
 from harness.sim.optics.poisson import free_heights
 from harness.sim.optics.shading import design, scaled_position

@@ -10,8 +10,7 @@ import pytest
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import OutOfDomain
 from harness.sim.gel.gel import R15_SKIRT, deform
-from harness.sim.optics.fast import arctangent, change_fast, padded
-from harness.sim.optics.kernels import change_exactly, to_pixels
+from harness.sim.optics.kernels import arctangent, change_exactly, change_fast, padded, to_pixels
 from harness.sim.optics.optics import Optics, OpticsLevel
 from harness.sim.optics.tactile_calibration import TactileCalibration, shipped_calibration
 

@@ -6,7 +6,7 @@ import trimesh
 
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh, signed_volume
-from harness.sim.solid.finer_surface import with_edges_below
+from harness.sim.solid.filled import with_edges_below
 from tests.oracles.seen_shapes import cuboid
 
 BOX = cuboid(0.3, 0.01, 0.002)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import MeshRefused
-from harness.sim.light.appearance_read import read_appearance
+from harness.sim.light.appearance_source import read_appearance
 from harness.sim.solid.formats.three_mf import read_3mf
 from harness.sim.solid.intake import take_in
 from tests.support.made_meshes import VOLUME, mesh_xml, model_xml, write_3mf
