@@ -10,7 +10,6 @@ import numpy as np
 from harness.basics.clock import now
 from harness.basics.errors import WrongUse
 from harness.basics.store import Store, digest
-from harness.effects.accuracy import Level
 from harness.effects.effect import Effect
 from harness.effects.plan import Plan, PlannedEffect
 
@@ -121,7 +120,11 @@ class _Run:
         step = self._planned[effect.provides]
         if effect.provides not in self._keys:
             needs = [self._input_key(need) for need in effect.needs]
-            about = (effect.provides, effect.version, tuple(needs), tuple(sorted(_named(step).items())))
+            # The levels that tell a result from others.
+            choice, levels = step.effect.choice, dict(step.levels)
+            if choice is not None and levels[choice.name] not in step.effect.ways:
+                del levels[choice.name]
+            about = (effect.provides, effect.version, tuple(needs), tuple(sorted(levels.items())))
             self._keys[effect.provides] = digest(about)
         return self._keys[effect.provides]
 
@@ -132,18 +135,6 @@ class _Run:
         if name not in self._keys:
             self._keys[name] = digest(self.sources[name])
         return self._keys[name]
-
-
-def _named(step: PlannedEffect) -> dict[str, Level]:
-    """The levels that tell a result from others.
-
-    An effect's own way, the one that others are held against, goes without a name, so that a new way
-    beside it drops nothing that was stored.
-    """
-    choice, levels = step.effect.choice, dict(step.levels)
-    if choice is not None and levels[choice.name] not in step.effect.ways:
-        del levels[choice.name]
-    return levels
 
 
 def frozen(value: Any) -> Any:

@@ -60,13 +60,13 @@ def scene_plan(scene: SceneFile, sensor: TactileSensor, accuracy: Accuracy | Non
     Raises:
         WrongUse: ``observe`` names something that nothing computes or that the scene rules out.
     """
-    return plan(EFFECTS, Facts(scene, sensor), wanted_of(scene), accuracy or default_accuracy(EFFECTS))
-
-
-def wanted_of(scene: SceneFile) -> tuple[str, ...]:
-    """What the scene observes and, where it is heard, the modes that its sounds are compared with."""
     heard = scene.sensors.sound and MODES not in scene.observe
-    return (*scene.observe, MODES) if heard else scene.observe
+    return plan(
+        EFFECTS,
+        Facts(scene, sensor),
+        (*scene.observe, MODES) if heard else scene.observe,
+        accuracy or default_accuracy(EFFECTS),
+    )
 
 
 def without_sound(scene: SceneFile) -> SceneFile:

@@ -82,7 +82,7 @@ class _Search:
             self.sources.append(quantity)
             return
         path = (*path, quantity)
-        if _called_for(effect, self.facts):
+        if effect.when is None or effect.when.holds(self.facts):
             _require_way(effect, self.facts, self.accuracy)
             for need in effect.needs:
                 self.visit(need, quantity, path)
@@ -125,10 +125,6 @@ def plan(effects: Sequence[Effect], facts: Facts, wanted: Iterable[str], accurac
 def default_accuracy(effects: Iterable[Effect]) -> Accuracy:
     """Every knob of a catalogue where nobody chooses."""
     return Accuracy.default(knobs_of(effects))
-
-
-def _called_for(effect: Effect, facts: Facts) -> bool:
-    return effect.when is None or effect.when.holds(facts)
 
 
 def _bypass(effect: Effect, asked_by: str) -> str:

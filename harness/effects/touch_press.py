@@ -212,23 +212,26 @@ def press_mesh(
     return _pressed(sources, "object", gel, scene, levels, force)
 
 
-def press_knobs() -> Accuracy:
-    """The knobs of a press, where nobody chooses."""
-    return Accuracy.default(knobs_of(_touching(press_effects(frozenset(), own_rest=False))))
-
-
 def _pressed(
     given: Mapping[str, Any], of: Heights, gel: Gel, scene: SceneFile, levels: Sequence[str], force: bool
 ) -> Press:
     effects = press_effects(frozenset(given), gel.rest is not None, gel.dots is not None)
-    chosen = press_knobs().with_texts(levels)
+    press_knobs = knobs_of(_touching(press_effects(frozenset(), own_rest=False)))
+    chosen = Accuracy.default(press_knobs).with_texts(levels)
     known = default_accuracy(effects)
     accuracy = known.with_({name: level for name, level in chosen.items() if name in known.levels})
     wanted = ["touch.image", "touch.saturated", "touch.extrapolated"]
     wanted += ["touch.shadow_out_of_table"] if gel.sensor.casts_shadow else []
     wanted += ["touch.force"] if force else []
     made = plan(effects, Facts(scene, gel.sensor), wanted, accuracy)
-    _refuse_idle(levels, made)
+    dialled = {name for step in made.ran for name in step.levels}
+    for text in levels:
+        name = text.partition("=")[0].strip()
+        if name not in dialled:
+            raise WrongUse(
+                f"{text}: nothing that runs here goes by {name}; leave it out (there are "
+                f"{', '.join(sorted(dialled))})"
+            )
     sources: dict[str, Any] = {
         "sensor": gel.sensor,
         "sensor.calibration": gel.calibration,
@@ -262,17 +265,6 @@ def _file(made: Plan, scene: SceneFile) -> dict[str, Any]:
 
 def _touching(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     return tuple(effect for effect in effects if effect.provides.startswith("touch."))
-
-
-def _refuse_idle(levels: Sequence[str], made: Plan) -> None:
-    dialled = {name for step in made.ran for name in step.levels}
-    for text in levels:
-        name = text.partition("=")[0].strip()
-        if name not in dialled:
-            raise WrongUse(
-                f"{text}: nothing that runs here goes by {name}; leave it out (there are "
-                f"{', '.join(sorted(dialled))})"
-            )
 
 
 def press_effects(given: frozenset[str], own_rest: bool, own_dots: bool = False) -> tuple[Effect, ...]:

@@ -106,13 +106,22 @@ def _pitcher(edge: float) -> Mesh:
         halves=[(7.5, 12.0), (6.0, 10.0), (5.5, 9.0), (5.5, 9.0), (5.5, 9.0), (6.0, 9.5), (8.5, 11.0)],
         edge=edge,
     )
-    return union([_with_spout(body), handle])
+    # The upper wall drawn out and narrowed opposite the handle, keeping its thickness.
+    x, y, z = body.vertices.T
+    aside = np.arctan2(y, -x)
+    rise = np.clip((z - 188.0) / 48.0, 0.0, 1.3)
+    out = 17.0 * rise**2 * np.exp(-((aside / 0.33) ** 2))
+    radius = np.maximum(np.hypot(x, y), 1e-9)
+    grown = 1.0 + out * (radius > 30.0) / radius
+    return union([Mesh(np.column_stack([x * grown, y * grown, z + 0.25 * out]), body.faces), handle])
 
 
 def _tray(edge: float) -> Mesh:
     floor = polygon([(0.0, 0.0), (86.0, 0.0), (86.0, 6.0), (0.0, 6.0)])
     wall = stroke(np.array([[86.0, 4.0], [91.5, 29.0]]), np.array([7.5, 7.0]))
-    profile = half_profile(floor + wall ^ _above(0.0), 1.8, 5.0)
+    profile = half_profile(
+        (floor + wall) ^ CrossSection.square((400.0, 400.0)).translate((0.0, 0.0)), 1.8, 5.0
+    )
     return lathe(walked(profile, edge), edge, _phase(edge), ring=_rounded_square)
 
 
@@ -158,17 +167,6 @@ def _handle(points: list[tuple[float, float]], halves: list[tuple[float, float]]
     return tube(smooth[:, :2], smooth[:, 2:], edge)
 
 
-def _with_spout(body: Mesh) -> Mesh:
-    """The upper wall drawn out and narrowed opposite the handle, keeping its thickness."""
-    x, y, z = body.vertices.T
-    aside = np.arctan2(y, -x)
-    rise = np.clip((z - 188.0) / 48.0, 0.0, 1.3)
-    out = 17.0 * rise**2 * np.exp(-((aside / 0.33) ** 2))
-    radius = np.maximum(np.hypot(x, y), 1e-9)
-    grown = 1.0 + out * (radius > 30.0) / radius
-    return Mesh(np.column_stack([x * grown, y * grown, z + 0.25 * out]), body.faces)
-
-
 def _rounded_square(distance: float, share: FloatArray) -> FloatArray:
     """A square of half side ``distance`` whose corner radius grows with it, from 12 mm at 80 mm."""
     corner = 12.0 + distance - 80.0 if distance > 80.0 else 12.0 * distance / 80.0
@@ -188,10 +186,6 @@ def _hexagon(across_flats: float) -> CrossSection:
     corner = across_flats / np.sqrt(3.0)
     angles = np.radians(60.0 * np.arange(6))
     return polygon([(float(corner * np.cos(a)), float(corner * np.sin(a))) for a in angles])
-
-
-def _above(height: float) -> CrossSection:
-    return CrossSection.square((400.0, 400.0)).translate((0.0, height))
 
 
 _BUILDERS: MappingProxyType[str, Callable[[float], Mesh]] = MappingProxyType(
@@ -300,7 +294,13 @@ def slab(area: CrossSection, thickness: float, rounding: float, edge: float) -> 
     Returns:
         A watertight mesh, outward; its two flat faces have no vertices inside.
     """
-    insets, heights = _section(thickness, rounding, edge)
+    # Inset from the outline and height of every layer of vertices, bottom to top.
+    angle = np.linspace(0.0, 0.5 * np.pi, _STEPS_ROUND + 1)
+    inset = rounding * (1.0 - np.sin(angle))
+    height = -0.5 * thickness + rounding * (1.0 - np.cos(angle))
+    straight = np.linspace(height[-1], -height[-1], max(2, int(np.ceil(2.0 * -height[-1] / edge)) + 1))
+    insets = np.concatenate([inset, np.zeros(len(straight) - 2), inset[::-1]])
+    heights = np.concatenate([height[:-1], straight, -height[:-1][::-1]])
     loops = [walked(np.asarray(contour), edge, closed=True) for contour in area.to_polygons()]
     normals = [_outward_normals(loop) for loop in loops]
     sizes = [len(loop) for loop in loops]
@@ -315,16 +315,6 @@ def slab(area: CrossSection, thickness: float, rounding: float, edge: float) -> 
     ]
     faces = np.vstack([cap[:, ::-1], cap + total * (len(layers) - 1), *sides])
     return outward(Mesh(np.vstack(layers), faces))
-
-
-def _section(thickness: float, rounding: float, edge: float) -> tuple[FloatArray, FloatArray]:
-    """Inset from the outline and height of every layer of vertices, bottom to top."""
-    angle = np.linspace(0.0, 0.5 * np.pi, _STEPS_ROUND + 1)
-    inset = rounding * (1.0 - np.sin(angle))
-    height = -0.5 * thickness + rounding * (1.0 - np.cos(angle))
-    straight = np.linspace(height[-1], -height[-1], max(2, int(np.ceil(2.0 * -height[-1] / edge)) + 1))
-    insets = np.concatenate([inset, np.zeros(len(straight) - 2), inset[::-1]])
-    return insets, np.concatenate([height[:-1], straight, -height[:-1][::-1]])
 
 
 def _outward_normals(loop: FloatArray) -> FloatArray:

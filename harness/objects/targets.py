@@ -5,7 +5,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
 from harness.objects.solid import lathe, outward
@@ -36,19 +35,14 @@ def ball(edge: float = 3e-3) -> Mesh:
         A watertight mesh, outward.
     """
     fine = edge * _FINER
-    return outward(lathe(_profile(fine), fine, np.mod(7.318281828 * fine / BALL_RADIUS, 1.0)))
-
-
-def _profile(edge: float) -> FloatArray:
-    """``(n, 2)`` metres (distance from the axis, height): foot, stem, ball, top."""
     centre = (_HEIGHT - 1.0) * BALL_RADIUS
     from_below = np.arcsin(_STEM)
-    steps = int(np.ceil((np.pi - from_below) * BALL_RADIUS / edge))
+    steps = int(np.ceil((np.pi - from_below) * BALL_RADIUS / fine))
     turned = np.linspace(from_below, np.pi, steps + 1)
     arc = np.column_stack([BALL_RADIUS * np.sin(turned), centre - BALL_RADIUS * np.cos(turned)])
     arc[-1, 0] = 0.0
     foot = np.array([[0.0, 0.0], [_STEM * BALL_RADIUS, 0.0]])
-    return np.vstack([foot, arc])
+    return outward(lathe(np.vstack([foot, arc]), fine, np.mod(7.318281828 * fine / BALL_RADIUS, 1.0)))
 
 
 _BUILDERS: MappingProxyType[str, Callable[[float], Mesh]] = MappingProxyType({"ball": ball})

@@ -8,11 +8,10 @@ Level 3 Basic Linear Algebra Subprograms, ACM TOMS 16(1), 1990.
 
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import get_cython_function_address, intrinsic
+from numba.extending import intrinsic
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
@@ -21,12 +20,6 @@ _NO, _YES, _RIGHT, _LOWER, _UNIT = (ord(letter) for letter in "NTRLU")
 
 _stored: Any = cgutils.alloca_once_value
 _parts: Any = cgutils.unpack_tuple
-
-
-def blas_addresses() -> IntArray:
-    """``(2,)``: where dgemm and dtrsm are in this process, for the kernels that call them."""
-    names = ("dgemm", "dtrsm")
-    return np.array([get_cython_function_address("scipy.linalg.cython_blas", name) for name in names])
 
 
 def _fortran_code(_typing: Any, address: Any, values: Any) -> Any:

@@ -71,23 +71,27 @@ def elimination(pattern: Pattern, together: IntArray | None = None) -> Eliminati
     members = np.argsort(together, kind="stable")
     width = np.bincount(together, minlength=groups).astype(np.int64)
     starts, neighbours = _without_diagonal(pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64))
-    order = dissected(starts, neighbours)
+    if len(neighbours) == 0:
+        order = np.arange(len(starts) - 1)  # unconnected unknowns need no dissection
+    else:
+        graph = pymetis.CSRAdjacency(starts.astype(np.int32), neighbours.astype(np.int32))
+        dissected, _ = pymetis.nested_dissection(graph, options=pymetis.Options(seed=_SEED))
+        order = np.asarray(dissected, dtype=np.int64)
     parent = _tree(starts, neighbours, order, _ranks(order))
     follow = _postorder(parent)
-    order, parent = order[follow], _renumbered(parent, follow)
+    ranks = _ranks(follow)
+    old = parent[follow]
+    order, parent = order[follow], np.where(old < 0, -1, ranks[old])
     below = _below(starts, neighbours, order, _ranks(order), parent, width)
     ends = _supernodes(parent, below, width[order])
     row_starts, rows, children = _structure(starts, neighbours, order, _ranks(order), ends)
-    return _in_unknowns(order, ends, row_starts, rows, children, width, members)
-
-
-def dissected(starts: IntArray, neighbours: IntArray) -> IntArray:
-    """``(g,)``: the old number of each new one, by nested dissection."""
-    if len(neighbours) == 0:
-        return np.arange(len(starts) - 1)
-    graph = pymetis.CSRAdjacency(starts.astype(np.int32), neighbours.astype(np.int32))
-    order, _ = pymetis.nested_dissection(graph, options=pymetis.Options(seed=_SEED))
-    return np.asarray(order, dtype=np.int64)
+    # Each group replaced by the unknowns that are in it.
+    begins = np.concatenate([[0], np.cumsum(width)])
+    firsts = np.concatenate([[0], np.cumsum(width[order])])
+    unknowns = members[_runs(begins[order], width[order])]
+    long_rows = _runs(firsts[rows], width[order[rows]])
+    long_starts = np.concatenate([[0], np.cumsum(width[order[rows]])])[row_starts]
+    return Elimination(unknowns, _ranks(unknowns), firsts[ends], long_starts, long_rows, children)
 
 
 @compiled
@@ -154,12 +158,6 @@ def _postorder(parent: IntArray) -> IntArray:
                 order[done] = node
                 done += 1
     return order
-
-
-def _renumbered(parent: IntArray, follow: IntArray) -> IntArray:
-    ranks = _ranks(follow)
-    old = parent[follow]
-    return np.where(old < 0, -1, ranks[old])
 
 
 @compiled
@@ -260,24 +258,6 @@ def _structure(
             following[s] = first[above]
             first[above] = s
     return row_starts, rows[:total].copy(), children
-
-
-def _in_unknowns(
-    order: IntArray,
-    ends: IntArray,
-    row_starts: IntArray,
-    rows: IntArray,
-    children: IntArray,
-    width: IntArray,
-    members: IntArray,
-) -> Elimination:
-    """Each group replaced by the unknowns that are in it."""
-    begins = np.concatenate([[0], np.cumsum(width)])
-    firsts = np.concatenate([[0], np.cumsum(width[order])])
-    unknowns = members[_runs(begins[order], width[order])]
-    long_rows = _runs(firsts[rows], width[order[rows]])
-    long_starts = np.concatenate([[0], np.cumsum(width[order[rows]])])[row_starts]
-    return Elimination(unknowns, _ranks(unknowns), firsts[ends], long_starts, long_rows, children)
 
 
 def _runs(begins: IntArray, lengths: IntArray) -> IntArray:

@@ -9,11 +9,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
+from numba.extending import get_cython_function_address
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled, copy_line
 from harness.basics.errors import MeshRefused, WrongUse
-from harness.sim.factor.blas_calls import blas_addresses
 from harness.sim.factor.eight_wide import (
     EIGHT,
     gather_1,
@@ -129,12 +129,18 @@ def _eliminated(
     matrix: SparseColumns, plan: Elimination, panels: FloatArray, places: IntArray
 ) -> tuple[Pivots, int | None]:
     """The pivots, and the unknown at which they ended early."""
-    _check(matrix, plan)
-    unknowns, high = len(plan.order), plan.widths + plan.heights
+    unknowns = len(plan.order)
+    if matrix.shape != (unknowns, unknowns) or matrix.dtype != np.float64:
+        raise WrongUse(
+            f"a matrix of shape {matrix.shape} and type {matrix.dtype} was to be factorised by a plan for "
+            f"({unknowns}, {unknowns}) of float64"
+        )
+    high = plan.widths + plan.heights
     diagonal = np.abs(matrix.diagonal())[plan.order]
     values, sums = np.empty(unknowns), np.zeros(unknowns)
+    names = ("dgemm", "dtrsm")
     bad = factorise(
-        blas_addresses(),
+        np.array([get_cython_function_address("scipy.linalg.cython_blas", name) for name in names]),
         matrix.data,
         matrix.indices,
         matrix.indptr,
@@ -168,15 +174,6 @@ def _deepest(plan: Elimination) -> int:
             held += left
         most = max(most, held)
     return max(most, 1)
-
-
-def _check(matrix: SparseColumns, plan: Elimination) -> None:
-    unknowns = len(plan.order)
-    if matrix.shape != (unknowns, unknowns) or matrix.dtype != np.float64:
-        raise WrongUse(
-            f"a matrix of shape {matrix.shape} and type {matrix.dtype} was to be factorised by a plan for "
-            f"({unknowns}, {unknowns}) of float64"
-        )
 
 
 @compiled

@@ -170,15 +170,26 @@ class ContactForce:
         newtons = pressure.sum(axis=(1, 2)) * pitch**2
         edge = np.ones(depth.shape[1:], dtype=np.bool_)
         edge[1:-1, 1:-1] = False
+        radius = pitch * np.sqrt(np.count_nonzero(depth, axis=(1, 2)) / np.pi)
+        deepest: FloatArray = depth.max(axis=(1, 2))
+        strains: FloatArray = np.divide(deepest, radius, out=np.zeros_like(radius), where=radius > 0.0)
+        _, rows, columns = pressure.shape
+        y, x = (np.arange(n) + 0.5 - n / 2.0 for n in (rows, columns))
+        whole = pressure.sum(axis=(1, 2))
+        moments = np.stack(
+            [(pressure * x).sum(axis=(1, 2)), (pressure * y[:, None]).sum(axis=(1, 2))], axis=-1
+        )
+        centres = np.full(moments.shape, np.nan)
+        centres[whole > 0.0] = pitch * moments[whole > 0.0] / whole[whole > 0.0, None]
         return cls(
             read_only(newtons),
             read_only(newtons * np.sqrt((shares**2).sum(axis=1))),
             read_only(shares),
             read_only(pressure),
-            read_only(_centres(pressure, pitch)),
+            read_only(centres),
             read_only(np.asarray((depth[:, edge] > 0.0).any(axis=1))),
             read_only(depth.max(axis=(1, 2)) / thickness),
-            read_only(_strains(depth, pitch)),
+            read_only(strains),
         )
 
 
@@ -246,7 +257,11 @@ def _pressed(
     """Pa of every pixel, by squares of ``cells`` pixels a side."""
     merged, side = _merged(depth, cells), pitch * cells
     if level == "winkler":
-        pascals = _foundation(merged, side, thickness, gel)
+        # Every contact on springs of its own.
+        parts, pascals = _contacts(merged), np.zeros(merged.shape)
+        for k, box in enumerate(find_objects(parts)):
+            alone = np.where(parts[box] == k + 1, merged[box], 0.0)
+            pascals[box] += _Search(alone, side, thickness, gel).springs()
     else:
         pascals = _settled(contact_pressure(merged, side, thickness, gel))
     # A square at the border may reach past the picture: what it carries is put on the pixels that are seen.
@@ -272,15 +287,6 @@ def _merged(depth: FloatArray, cells: int) -> FloatArray:
     rows, columns = depth.shape
     padded = np.pad(depth, ((0, -rows % cells), (0, -columns % cells)))
     return block_means(padded, cells)
-
-
-def _foundation(depth: FloatArray, side: float, thickness: float, gel: GelElastic) -> FloatArray:
-    """Pa: every contact on springs of its own."""
-    parts, pascals = _contacts(depth), np.zeros(depth.shape)
-    for k, box in enumerate(find_objects(parts)):
-        alone = np.where(parts[box] == k + 1, depth[box], 0.0)
-        pascals[box] += spring_pressure(alone, side, thickness, gel)
-    return pascals
 
 
 def _contacts(depth: FloatArray) -> IntArray:
@@ -315,23 +321,6 @@ def _known(depth: FloatArray, pitch: float, thickness: float, gel: GelElastic) -
     return abs(by_poisson) / steps, abs(by_thickness)
 
 
-def _strains(depth: FloatArray, pitch: float) -> FloatArray:
-    radius = pitch * np.sqrt(np.count_nonzero(depth, axis=(1, 2)) / np.pi)
-    deepest: FloatArray = depth.max(axis=(1, 2))
-    strains: FloatArray = np.divide(deepest, radius, out=np.zeros_like(radius), where=radius > 0.0)
-    return strains
-
-
-def _centres(pressure: FloatArray, pitch: float) -> FloatArray:
-    _, rows, columns = pressure.shape
-    y, x = (np.arange(n) + 0.5 - n / 2.0 for n in (rows, columns))
-    whole = pressure.sum(axis=(1, 2))
-    moments = np.stack([(pressure * x).sum(axis=(1, 2)), (pressure * y[:, None]).sum(axis=(1, 2))], axis=-1)
-    centres = np.full(moments.shape, np.nan)
-    centres[whole > 0.0] = pitch * moments[whole > 0.0] / whole[whole > 0.0, None]
-    return centres
-
-
 def contact_pressure(depth: FloatArray, pitch: float, thickness: float, gel: GelElastic) -> Pressure:
     """Solve one contact, or several that feel each other.
 
@@ -349,21 +338,6 @@ def contact_pressure(depth: FloatArray, pitch: float, thickness: float, gel: Gel
     found = _Search(depth[rows, columns], pitch, thickness, gel).run()
     pascals[rows, columns] = found.pascals
     return Pressure(read_only(pascals), found.left, found.turns)
-
-
-def spring_pressure(depth: FloatArray, pitch: float, thickness: float, gel: GelElastic) -> FloatArray:
-    """``(rows, columns)`` Pa under one contact, were the gel springs: the best that goes as the depth.
-
-    A foundation of springs (Johnson, section 4.3) has no stiffness of its own on a layer; this one's is that
-    of the least energy, so that an edge gets other springs than a ball.
-
-    Args:
-        depth: ``(rows, columns)`` metres, 0 or more, somewhere above zero.
-        pitch: metres, side of a square.
-        thickness: metres of the gel; infinite for a half-space.
-        gel: how stiff it is.
-    """
-    return _Search(depth, pitch, thickness, gel).springs()
 
 
 def _span(touched: AnyArray) -> slice:

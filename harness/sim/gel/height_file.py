@@ -137,14 +137,13 @@ def _check_unit(heights: FloatArray, sensor: TactileSensor, of: Heights, name: s
         return
     scales = [*_UNITS, (f"pixels of {sensor.pitch * 1e3:g} mm", sensor.pitch)]
     span = float(heights.max() - heights.min())
-    fits = [f"{unit} (times {scale:g})" for unit, scale in scales if _fits(most, span, scale, thick)]
+    fits = [
+        f"{unit} (times {scale:g})"
+        for unit, scale in scales
+        if (0.01 * thick <= span * scale <= thick and (most * scale <= thick or span < 0.5 * most))
+    ]
     like = f"; the numbers look like {' or '.join(fits)}" if fits else ""
     raise OutOfDomain(
         f"{name}: heights reach {most:.4g} m and the gel is {thick * 1e3:g} mm thick{like}; write metres of "
         "indentation"
     )
-
-
-def _fits(most: float, span: float, scale: float, thick: float) -> bool:
-    """Whether a map would be one in another unit, if only against a level of its own."""
-    return 0.01 * thick <= span * scale <= thick and (most * scale <= thick or span < 0.5 * most)

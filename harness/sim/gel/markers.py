@@ -161,19 +161,6 @@ def _grid(sensor: TactileSensor) -> MarkerGrid:
 def _moved(
     pressed: FloatArray, dots: FloatArray, sensor: TactileSensor, block: int, kernel: LayerKernel
 ) -> FloatArray:
-    nodes, depth = _nodes(pressed, sensor, block)
-    load = _loads(kernel.inwards(_distance(nodes, nodes)), depth)
-    apart = dots[:, None] - nodes[None]
-    distance = np.hypot(apart[..., 0], apart[..., 1])
-    per_metre = np.divide(
-        kernel.outwards(distance), distance, where=distance > 0.0, out=np.zeros_like(distance)
-    )
-    moved: FloatArray = np.einsum("mkc,mk,k->mc", apart, per_metre, load)
-    return moved
-
-
-def _nodes(pressed: FloatArray, sensor: TactileSensor, block: int) -> tuple[FloatArray, FloatArray]:
-    """``(k, 2)`` and ``(k,)`` metres: the blocks of pixels that the object reaches, and its mean depth."""
     starts = [np.arange(0, size, block) for size in pressed.shape]
     sums = np.add.reduceat(np.add.reduceat(pressed, starts[0], axis=0), starts[1], axis=1)
     sizes = [np.diff(np.append(start, size)) for start, size in zip(starts, pressed.shape, strict=True)]
@@ -182,25 +169,20 @@ def _nodes(pressed: FloatArray, sensor: TactileSensor, block: int) -> tuple[Floa
         (start + wide / 2.0 - size / 2.0) * sensor.pitch
         for start, wide, size in zip(starts, sizes, pressed.shape, strict=True)
     )
+    # Nodes are the blocks of pixels that the object reaches, with its mean depth there.
     rows, columns = np.nonzero(depth > 0.0)
-    return np.stack([x[columns], y[rows]], axis=-1), depth[rows, columns]
-
-
-def _distance(a: FloatArray, b: FloatArray) -> FloatArray:
-    apart: FloatArray = np.hypot(*(a[:, None] - b[None]).transpose(2, 0, 1))
-    return apart
-
-
-def _loads(gives: FloatArray, depth: FloatArray) -> FloatArray:
-    """Loads that push and never pull, and hold every node at its depth or beyond.
-
-    The least of ``load gives load / 2 - load depth`` over loads of zero or more (Kalker's principle;
-    Johnson, 1985, section 5.9), as non-negative least squares through the Cholesky factor.
-    """
-    factor = cholesky(gives, lower=True)
+    nodes, depth = np.stack([x[columns], y[rows]], axis=-1), depth[rows, columns]
+    between = np.hypot(*(nodes[:, None] - nodes[None]).transpose(2, 0, 1))
+    # Loads that push and never pull, and hold every node at its depth or beyond.
+    factor = cholesky(kernel.inwards(between), lower=True)
     load, _ = nnls(factor.T, solve_triangular(factor, depth, lower=True), maxiter=10 * len(depth) + 100)
-    found: FloatArray = load
-    return found
+    apart = dots[:, None] - nodes[None]
+    distance = np.hypot(apart[..., 0], apart[..., 1])
+    per_metre = np.divide(
+        kernel.outwards(distance), distance, where=distance > 0.0, out=np.zeros_like(distance)
+    )
+    moved: FloatArray = np.einsum("mkc,mk,k->mc", apart, per_metre, load)
+    return moved
 
 
 def _coverage(centres: FloatArray, sensor: TactileSensor) -> FloatArray:

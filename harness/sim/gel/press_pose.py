@@ -79,7 +79,18 @@ def _contact_place(mesh: Mesh, point: FloatArray, place: FloatArray, face: int) 
             f"the contact ({point[0]:g}, {point[1]:g}, {point[2]:g}) m is {moved * 1e3:.4g} mm off the "
             f"surface; the limit is {MOST_MOVED * 1e3:g} mm{_hint(mesh, point, place)}"
         )
-    normal = _smooth_normal(mesh, place, face)
+    # Between the normals at the face's corners, each over the faces that bend into this one (Phong).
+    own = mesh.face_normals[face]
+    near: IntArray = np.flatnonzero(mesh.face_normals @ own > _CREASE)
+    weighted = mesh.face_normals[near] * mesh.face_areas[near, None]
+    at_corners = np.stack(
+        [weighted[(mesh.faces[near] == vertex).any(axis=1)].sum(axis=0) for vertex in mesh.faces[face]]
+    )
+    lengths = np.linalg.norm(at_corners, axis=1, keepdims=True)
+    normal = np.asarray(own)
+    if (lengths > 0.0).all():
+        blend = plane_shares(mesh.corners[face], place) @ (at_corners / lengths)
+        normal = blend / np.linalg.norm(blend)
     if not normal.any():
         raise OutOfDomain("the surface has no normal at the contact; move it off the sliver of a face")
     return ContactPlace(read_only(place), read_only(normal), moved)
@@ -157,19 +168,3 @@ def _hint(mesh: Mesh, point: FloatArray, nearest: FloatArray) -> str:
         return "; read as millimetres it would be on it: write metres, or each number with its unit"
     x, y, z = np.round(nearest, 6) + 0.0  # no -0
     return f"; give a point of the surface, as the nearest, {x:g} {y:g} {z:g} (metres, mesh frame)"
-
-
-def _smooth_normal(mesh: Mesh, place: FloatArray, face: int) -> FloatArray:
-    """Between the normals at the face's corners, each over the faces that bend into this one (Phong)."""
-    own = mesh.face_normals[face]
-    near: IntArray = np.flatnonzero(mesh.face_normals @ own > _CREASE)
-    weighted = mesh.face_normals[near] * mesh.face_areas[near, None]
-    at_corners = np.stack(
-        [weighted[(mesh.faces[near] == vertex).any(axis=1)].sum(axis=0) for vertex in mesh.faces[face]]
-    )
-    lengths = np.linalg.norm(at_corners, axis=1, keepdims=True)
-    if not (lengths > 0.0).all():
-        return np.asarray(own)
-    blend = plane_shares(mesh.corners[face], place) @ (at_corners / lengths)
-    normal: FloatArray = blend / np.linalg.norm(blend)
-    return normal

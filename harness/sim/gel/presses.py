@@ -135,12 +135,6 @@ def presses_of(mesh: Mesh, gel_from_object: FloatArray) -> Presses:
     points = object_from_gel[:, :3, 3] + gaps[:, None] * object_from_gel[:, :3, 2]
     normals = np.array([place.normal for place in contact_places(mesh, points)]).reshape(-1, 3)
     leant = np.swapaxes(frames_facing(-normals), 1, 2) @ object_from_gel[:, :3, :3]
-    tilts, azimuths, yaws = _angles(leant)
-    return Presses(points, normals, -gaps, tilts, azimuths, yaws)
-
-
-def _angles(leant: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Of ``(n, 3, 3)`` rotations ``Rz(azimuth) Ry(tilt) Rz(yaw - azimuth)``: tilts, azimuths, yaws."""
     across = np.hypot(leant[:, 0, 2], leant[:, 1, 2])
     tilts = np.arctan2(across, leant[:, 2, 2])
     azimuths = np.arctan2(leant[:, 1, 2], leant[:, 0, 2])
@@ -149,4 +143,4 @@ def _angles(leant: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     # right where the tilt is too small for its azimuth to be.
     x, y, z = leant[:, 0, 0], leant[:, 1, 0], leant[:, 2, 0]
     left = np.arctan2(ca * y - sa * x, ct * (ca * x + sa * y) - st * z)
-    return tilts, azimuths, azimuths + left
+    return Presses(points, normals, -gaps, tilts, azimuths, azimuths + left)

@@ -91,7 +91,9 @@ def half_as_fine(view: ToolView, sensor: TactileSensor) -> ToolView:
 def _view_of(
     depth: FloatArray, object_from_gel: FloatArray, origin: FloatArray, pitch: float, sensor: TactileSensor
 ) -> ToolView:
-    pooled = _pooled(depth)
+    # The rows first, by whole rows at a time: several times as fast as blocks.
+    by_rows = np.minimum.reduceat(depth, np.arange(0, depth.shape[0], POOL), axis=0)
+    pooled = np.asarray(np.minimum.reduceat(by_rows, np.arange(0, depth.shape[1], POOL), axis=1))
     nearest = _front(pooled, pitch, sensor.window, _SLACK) - _SLACK
     farthest = _front(pooled, pitch, sensor.window, -_SLACK) + sensor.gel_thickness + _SLACK
     missing = np.full(depth.shape, np.nan)
@@ -106,13 +108,6 @@ def _view_of(
         missing.copy(),
         np.zeros((*depth.shape, LEAN)),
     )
-
-
-def _pooled(depth: FloatArray) -> FloatArray:
-    """The first surface in blocks of pixels: as fine as the limits on the gel's place need be."""
-    # The rows first, by whole rows at a time: several times as fast as blocks.
-    by_rows = np.minimum.reduceat(depth, np.arange(0, depth.shape[0], POOL), axis=0)
-    return np.asarray(np.minimum.reduceat(by_rows, np.arange(0, depth.shape[1], POOL), axis=1))
 
 
 def _front(pooled: FloatArray, pitch: float, window: tuple[float, float], wider: float) -> FloatArray:

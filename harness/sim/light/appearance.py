@@ -138,9 +138,12 @@ def smooth_normals(mesh: Mesh, crease: float = CREASE) -> FloatArray:
     at = place_of.reshape(-1)[mesh.faces]
     order = np.argsort(at.ravel(), kind="stable")
     starts = np.searchsorted(at.ravel()[order], np.arange(at.max() + 2))
-    return smoothed_normals(
-        at, order // 3, starts, mesh.face_normals, _corner_weights(mesh), float(np.cos(crease))
-    )
+    edges = np.roll(mesh.corners, -1, axis=1) - mesh.corners
+    back = -np.roll(edges, 1, axis=1)
+    sine = np.linalg.norm(np.cross(edges, back), axis=2)
+    angle = np.arctan2(sine, np.einsum("mcx,mcx->mc", edges, back))
+    weights: FloatArray = mesh.face_areas[:, None] * angle
+    return smoothed_normals(at, order // 3, starts, mesh.face_normals, weights, float(np.cos(crease)))
 
 
 def plain(mesh: Mesh, albedo: tuple[float, float, float], crease: float = CREASE) -> Appearance:
@@ -153,16 +156,6 @@ def plain(mesh: Mesh, albedo: tuple[float, float, float], crease: float = CREASE
         np.zeros((count, 3, 2)),
         np.full(count, NO_TEXTURE),
     )
-
-
-def _corner_weights(mesh: Mesh) -> FloatArray:
-    """``(m, 3)`` area times the angle at each corner."""
-    edges = np.roll(mesh.corners, -1, axis=1) - mesh.corners
-    back = -np.roll(edges, 1, axis=1)
-    sine = np.linalg.norm(np.cross(edges, back), axis=2)
-    angle = np.arctan2(sine, np.einsum("mcx,mcx->mc", edges, back))
-    weights: FloatArray = mesh.face_areas[:, None] * angle
-    return weights
 
 
 @compiled

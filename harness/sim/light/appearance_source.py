@@ -26,7 +26,7 @@ from harness.picture.texture import decode_texture
 from harness.sim.light.appearance import CREASE, NO_TEXTURE, Appearance, smooth_normals
 from harness.sim.solid.coordinates import move_near
 from harness.sim.solid.formats.obj_colours import read_obj_colours
-from harness.sim.solid.formats.parts import MeshFile, MeshPart, TextureFile, merge_parts
+from harness.sim.solid.formats.parts import MeshFile, MeshPart, merge_parts
 from harness.sim.solid.mesh_read import DECLARING, METRES, check_extent, choose_up_axis, unit_name
 
 GREY = 0.5
@@ -90,11 +90,14 @@ def builtin_appearance(
     built = build(name, edge)
     shape = type(built)(built.vertices * scale, built.faces)
     count = len(shape.faces)
+    low, high = shape.bounds
+    across = [int(axis) for axis in range(3) if axis != int(np.argmin(high - low))]
+    places: FloatArray = ((shape.corners - low) / (high - low))[..., across]
     return Appearance(
         shape,
         smooth_normals(shape, crease),
         np.ones((count, 3, 3)),
-        print_places(shape),
+        places,
         np.zeros(count, np.int64),
         (print_of(MATERIALS[name]),),
     )
@@ -167,21 +170,15 @@ def _read(path: Path) -> MeshFile:
 def _read_with_trimesh(path: Path) -> MeshFile:
     """Files that have colours of vertices or faces at most, e.g. PLY, and no files of their own."""
     import trimesh
+    from trimesh.resolvers import ZipResolver
 
     loaded = trimesh.load_scene(
-        path, process=False, maintain_order=True, skip_materials=True, resolver=_no_files()
+        path, process=False, maintain_order=True, skip_materials=True, resolver=ZipResolver({})
     )
     pieces = [piece for piece in loaded.dump() if isinstance(piece, trimesh.Trimesh)]
     if not any(len(piece.faces) for piece in pieces):
         raise MeshRefused(f"{path.name} holds no triangle; export a surface")
     return MeshFile(tuple(_part(piece) for piece in pieces))
-
-
-def _no_files() -> Any:
-    """A resolver that finds no file: what PLY and the like refer to is not read."""
-    from trimesh.resolvers import ZipResolver
-
-    return ZipResolver({})
 
 
 def _part(piece: Any) -> MeshPart:
@@ -211,7 +208,11 @@ def _coloured(mesh: Mesh, read: MeshFile, crease: float) -> Appearance:
         else:
             if part.picture.name not in numbers:
                 numbers[part.picture.name] = len(textures)
-                textures.append(_texture(part.picture, remarks))
+                # A picture's pixels, sRGB.
+                pixels, is_transparent = decode_texture(part.picture.read(), part.picture.name)
+                if is_transparent:
+                    remarks.append(f"the texture {part.picture.name} is partly transparent: rendered opaque")
+                textures.append(pixels)
             places.append(part.places)
             texture_of.append(np.full(count, numbers[part.picture.name]))
             tints.append(np.ones((count, 3, 3)) if part.tints is None else part.tints)
@@ -226,14 +227,6 @@ def _coloured(mesh: Mesh, read: MeshFile, crease: float) -> Appearance:
     )
 
 
-def _texture(picture: TextureFile, remarks: list[str]) -> ByteArray:
-    """A picture's pixels, sRGB."""
-    pixels, is_transparent = decode_texture(picture.read(), picture.name)
-    if is_transparent:
-        remarks.append(f"the texture {picture.name} is partly transparent: rendered opaque")
-    return pixels
-
-
 def print_of(material: str) -> ByteArray:
     """``(rows, columns, 3)`` sRGB: the print of a material, as wide and high as the object's box.
 
@@ -245,27 +238,11 @@ def print_of(material: str) -> ByteArray:
     base, printed = (np.array(colour) for colour in COLOURS[material])
     step = (np.arange(_TEXELS) + 0.5) / _TEXELS
     u, v = np.meshgrid(step, step)
-    inked = np.maximum(_bands(v), _dots(u, v))[..., None]
-    return bytes_from_linear(inked * printed + (1.0 - inked) * base)
-
-
-def print_places(mesh: Mesh) -> FloatArray:
-    """``(m, 3, 2)`` (u, v), 0 to 1: where in the print the corners of a mesh's faces are."""
-    low, high = mesh.bounds
-    across = [int(axis) for axis in range(3) if axis != int(np.argmin(high - low))]
-    places: FloatArray = ((mesh.corners - low) / (high - low))[..., across]
-    return places
-
-
-def _bands(v: FloatArray) -> FloatArray:
     apart = np.min([np.abs(v - at) for at in _BAND_AT], axis=0)
-    return np.asarray(apart < _BAND_HALF, dtype=np.float64)
-
-
-def _dots(u: FloatArray, v: FloatArray) -> FloatArray:
-    """Three rows between the bands, the middle one shifted by half a step."""
+    # Three rows between the bands, the middle one shifted by half a step.
     inked = np.zeros_like(u)
     for row, height in enumerate((0.32, 0.5, 0.68)):
         across = np.mod(_DOTS * u + 0.5 * (row % 2), 1.0) - 0.5
         inked = np.maximum(inked, np.hypot(across / _DOTS, v - height) < _DOT_RADIUS)
-    return inked.astype(np.float64)
+    inked = np.maximum(np.asarray(apart < _BAND_HALF, dtype=np.float64), inked.astype(np.float64))[..., None]
+    return bytes_from_linear(inked * printed + (1.0 - inked) * base)

@@ -91,7 +91,11 @@ def fine_edge(surface: Mesh, material: Material, limit: float, count: int | None
     budget = _FINE_BUDGET if count is None else _COUNTED_BUDGET
     short = max(FINE_SHARE * _shear_speed(material) / highest, _affordable(volume, budget))
     wall = thin_wall(surface, 0.5)
-    across = _across(wall, volume, _bent(surface, material, wall, volume, limit, count))
+    # Short against the wall or, where that is thin, its waves too, as far as budgets allow.
+    across = max(_WARPED * wall, _affordable(volume, _WARPED_BUDGET))
+    if across > _ACROSS * wall:
+        bent = _bent(surface, material, wall, volume, limit, count)
+        across = max(_ACROSS * wall, min(bent, _affordable(volume, _BUDGET)))
     return float(min(default_edge(surface, material, highest, count, SHARE), short, across))
 
 
@@ -152,22 +156,14 @@ def _bent(
 ) -> float:
     """Metres: short against a thin wall and the wave that bends it, as far as budgets allow."""
     if count is not None:
-        short = _BENT * np.sqrt(wall * _counted_wave(surface, count))
+        middle = 0.5 * float(surface.face_areas.sum())
+        short = _BENT * np.sqrt(wall * float(np.sqrt(np.pi * middle / (count + _BENT_SPARE))))
         return float(max(short, _affordable(volume, _BENT_BUDGET)))
     if flat_share(surface) < _FLAT:
         return np.inf
-    wave = min(bending_wave(material, wall, limit), _twist_wave(surface, wall, volume))
-    return float(max(_BENT_UP_TO * np.sqrt(wall * wave), _affordable_flat(surface, wall)))
-
-
-def _twist_wave(surface: Mesh, wall: float, volume: float) -> float:
-    """Metres: twice how wide a flat wall is, between its rims; infinite if it has none.
-
-    A strip that twists is sheared at its rims, whatever its length and wave: 60 x 15 x 1 mm bends with
-    waves of 49 mm in its third mode, and its second, a twist, is off by 1.3e-3 if cut for those.
-    """
     sides = float(surface.face_areas.sum()) - 2.0 * volume / wall
-    return 4.0 * volume / sides if sides > 0.0 else np.inf
+    wave = min(bending_wave(material, wall, limit), 4.0 * volume / sides if sides > 0.0 else np.inf)
+    return float(max(_BENT_UP_TO * np.sqrt(wall * wave), _affordable_flat(surface, wall)))
 
 
 def _affordable_flat(surface: Mesh, wall: float) -> float:
@@ -175,24 +171,6 @@ def _affordable_flat(surface: Mesh, wall: float) -> float:
     middle = 0.5 * float(surface.face_areas.sum())
     square = _FLAT_UNKNOWNS * middle / _FLAT_BUDGET
     return float(max(square**0.5, (square * wall**0.5) ** 0.4))
-
-
-def _counted_wave(surface: Mesh, count: int) -> float:
-    """Metres: the wave with which a thin wall of that surface bends in the highest of ``count`` modes.
-
-    Up to a wave it has pi times as many modes as its area holds squares of it, whatever its thickness and
-    material (Cremer, Heckl and Petersson, Structure-Borne Sound, 3rd edition, 2005).
-    """
-    middle = 0.5 * float(surface.face_areas.sum())
-    return float(np.sqrt(np.pi * middle / (count + _BENT_SPARE)))
-
-
-def _across(wall: float, volume: float, bent: float) -> float:
-    """Metres: short against the wall or, where that is thin, its waves too, as far as budgets allow."""
-    fine = max(_WARPED * wall, _affordable(volume, _WARPED_BUDGET))
-    if fine <= _ACROSS * wall:
-        return fine
-    return max(_ACROSS * wall, min(bent, _affordable(volume, _BUDGET)))
 
 
 def _affordable(volume: float, unknowns: float) -> float:

@@ -79,7 +79,10 @@ def modes_below(system: ModalSystem, limit: float, most: int | None = None) -> t
         )
     for seed, block in ((1, _BLOCK), (2, 2 * _BLOCK)):
         values, vectors, ceiling = _Lanczos(system, factor, seed, block).run((2 * np.pi * limit) ** 2, most)
-        expected = _count_below(system, ceiling)
+        pivots = inertia(system.shifted(-ceiling), system.plan)
+        expected = None
+        if pivots is not None and pivots.growth <= _GROWTH:
+            expected = pivots.negative - int(system.rigid.shape[1])
         if expected is None or len(values) >= expected:
             pairs = EigenPairs(values, vectors, _residual(system, values, vectors), len(values) == expected)
             return pairs, float(np.sqrt(ceiling) / (2.0 * np.pi))
@@ -102,14 +105,6 @@ def _dense(system: ModalSystem, ceiling: float, most: int | None) -> tuple[Eigen
     return EigenPairs(kept, shapes, _residual(system, kept, shapes), True), float(
         np.sqrt(ceiling) / (2 * np.pi)
     )
-
-
-def _count_below(system: ModalSystem, ceiling: float) -> int | None:
-    """How many elastic eigenvalues are below ``ceiling``; None where the factors cannot say."""
-    pivots = inertia(system.shifted(-ceiling), system.plan)
-    if pivots is None or pivots.growth > _GROWTH:
-        return None
-    return pivots.negative - int(system.rigid.shape[1])
 
 
 def _residual(system: ModalSystem, values: FloatArray, vectors: FloatArray) -> float:

@@ -184,7 +184,13 @@ def curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra)
     Raises:
         MeshRefused: unused nodes, inverted elements, or another volume than the surface encloses.
     """
-    _check_cells(undeformed)
+    unused = len(undeformed.nodes) - len(np.unique(undeformed.cells))
+    inverted = int(np.count_nonzero(undeformed.volumes <= 0.0))
+    if unused or inverted:
+        raise MeshRefused(
+            f"the volume mesh has {unused} nodes that no element holds and {inverted} inverted elements; "
+            "make it with sim.solid.tetrahedra.tetrahedra, which leaves out the ones and turns the others"
+        )
     mesh = quadratic_mesh(undeformed.nodes, undeformed.cells)
     if surface is not None:
         mesh = snapped(mesh, surface)
@@ -198,16 +204,6 @@ def curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra)
     if least_determinant(moved).min() <= 0.0:
         raise MeshRefused("the deformation turns an element inside out; deform the object less")
     return moved
-
-
-def _check_cells(tetrahedra: Tetrahedra) -> None:
-    unused = len(tetrahedra.nodes) - len(np.unique(tetrahedra.cells))
-    inverted = int(np.count_nonzero(tetrahedra.volumes <= 0.0))
-    if unused or inverted:
-        raise MeshRefused(
-            f"the volume mesh has {unused} nodes that no element holds and {inverted} inverted elements; "
-            "make it with sim.solid.tetrahedra.tetrahedra, which leaves out the ones and turns the others"
-        )
 
 
 def held_volume(mesh: QuadraticMesh) -> float:
@@ -317,19 +313,14 @@ def _with_middles(mesh: QuadraticMesh, nodes: FloatArray, corners: int) -> Quadr
 def _moved(mesh: QuadraticMesh, surface: Mesh, chosen: IntArray) -> FloatArray:
     """``(n, 3)`` m from each chosen node to the surface; zero for all others."""
     normals = Mesh(mesh.nodes, mesh.triangles).vertex_normals[chosen]
-    reach = _REACH_OF_EDGE * _shortest_edges(mesh)[chosen]
-    places, _ = nearest_on_surface(surface, mesh.nodes[chosen], normals, reach, _LEAST_COSINE)
-    way = np.zeros_like(mesh.nodes)
-    way[chosen] = places - mesh.nodes[chosen]
-    return way
-
-
-def _shortest_edges(mesh: QuadraticMesh) -> FloatArray:
-    """``(n,)`` m, of the edges of the surface that a node lies on; infinite inside."""
     shortest = np.full(len(mesh.nodes), np.inf)
     for first, middle in ((0, 3), (1, 4), (2, 5)):
         a, b = mesh.faces[:, first], mesh.faces[:, (first + 1) % 3]
         length = np.linalg.norm(mesh.nodes[a] - mesh.nodes[b], axis=1)
         for node in (a, b, mesh.faces[:, middle]):
             np.minimum.at(shortest, node, length)
-    return shortest
+    reach = _REACH_OF_EDGE * shortest[chosen]
+    places, _ = nearest_on_surface(surface, mesh.nodes[chosen], normals, reach, _LEAST_COSINE)
+    way = np.zeros_like(mesh.nodes)
+    way[chosen] = places - mesh.nodes[chosen]
+    return way

@@ -13,13 +13,13 @@ from harness.basics.compiled import compiled
 from harness.sim.factor.elimination import Elimination, elimination
 from harness.sim.factor.factorisation import SparseColumns
 from harness.sim.solid.modal_kernels import (
+    EDGES,
     MASS_POINTS,
     MASS_WEIGHTS,
     STIFFNESS_POINTS,
     assemble,
     pattern,
     shape_slopes,
-    shape_values,
 )
 from harness.sim.solid.modal_mesh import QuadraticMesh
 
@@ -128,6 +128,8 @@ def modal_system(
     if rule == "four points":
         points, weights_at = (STIFFNESS_POINTS, np.full(4, 0.25))
     rows, columns = pattern(mesh.cells, count)
+    corners = points * (2.0 * points - 1.0)
+    middles = 4.0 * points[:, EDGES[:, 0]] * points[:, EDGES[:, 1]]
     stiffness, mass = assemble(
         mesh.nodes,
         mesh.cells,
@@ -137,7 +139,7 @@ def modal_system(
         columns,
         shape_slopes(STIFFNESS_POINTS),
         shape_slopes(points),
-        shape_values(points),
+        np.concatenate([corners, middles], axis=1),
         weights_at,
     )
     by_rows = sp.bsr_array((stiffness, columns, rows), shape=(3 * count, 3 * count)).tocsr()

@@ -107,8 +107,13 @@ def read_depth(images: ByteArray, calibration: TactileCalibration, detection: De
     answers = [_read_one(image, calibration, colour, detection) for image in images]
     drift = np.array([drift for *_, drift in answers]).reshape(len(images), 3)
     dimming = np.array([dimming for _, _, dimming, _ in answers]).reshape(images.shape)
+    reads = [read for read, *_ in answers]
+    names = ("height", "contact", "imprint", "trusted", "error", "anchored")
     return Depth(
-        replace(_stacked([read for read, *_ in answers]), seconds=perf_counter() - began),
+        Inversion(
+            **{name: read_only(np.concatenate([vars(read)[name] for read in reads])) for name in names},
+            seconds=perf_counter() - began,
+        ),
         tuple(by for _, by, _, _ in answers),
         read_only(dimming),
         read_only(drift),
@@ -142,27 +147,16 @@ def _read_one(
     first = invert(image[None], with_background(calibration, _byte(rest)), detection)
     if not first.imprint.any():
         return first, with_background(calibration, _byte(rest)), np.zeros(image.shape), drift
-    dimming = colour.offset * _touched(first.height[0])[..., None]
+    height = first.height[0]
+    above = height - np.percentile(height, _AROUND)
+    share: FloatArray = gaussian_filter((above > TOUCHED * above.max()).astype(np.float64), _RIM)
+    dimming = colour.offset * share[..., None]
     by = with_background(replace(calibration, smooth=colour.slopes), _byte(rest + dimming))
     return invert(image[None], by, detection), by, dimming, drift
 
 
-def _touched(height: FloatArray) -> FloatArray:
-    above = height - np.percentile(height, _AROUND)
-    share: FloatArray = gaussian_filter((above > TOUCHED * above.max()).astype(np.float64), _RIM)
-    return share
-
-
 def _byte(picture: FloatArray) -> ByteArray:
     return np.clip(np.rint(picture), 0.0, 255.0).astype(np.uint8)
-
-
-def _stacked(reads: list[Inversion]) -> Inversion:
-    names = ("height", "contact", "imprint", "trusted", "error", "anchored")
-    return Inversion(
-        **{name: read_only(np.concatenate([vars(read)[name] for read in reads])) for name in names},
-        seconds=0.0,
-    )
 
 
 def contact_colour(calibration: TactileCalibration) -> ContactColour:
@@ -172,8 +166,20 @@ def contact_colour(calibration: TactileCalibration) -> ContactColour:
         CalibrationRefused: presses reached too few bins to tell.
     """
     normal, bins = _reached(calibration)
-    places = bins @ _between(calibration.rows, calibration.columns).T  # (n, 3, 6): channel, place term
-    terms = np.hstack([_normal_terms(normal), np.ones((len(normal), 1))])
+    x, y = (
+        axis.ravel()
+        for axis in np.meshgrid(
+            np.linspace(0, calibration.columns - 1, 3), np.linspace(0, calibration.rows - 1, 3)
+        )
+    )
+    raw = np.stack([x * x, y * y, x * y, x, y, np.ones_like(x)], axis=1)
+    assert raw.shape[1] == TABLE_TERMS
+    back = np.linalg.pinv(place_terms(scaled_position(x, y, calibration.rows, calibration.columns)))
+    places = bins @ np.asarray(back @ raw, dtype=np.float64).T  # (n, 3, 6): channel, place term
+    terms = design(normal, np.zeros_like(normal))
+    terms = np.hstack(
+        [np.ascontiguousarray(terms[:, ::POSITION_TERMS], dtype=np.float64), np.ones((len(normal), 1))]
+    )
     gram = terms.T @ terms
     gram += _RIDGE * np.diag(np.diag(gram))
     flat = places.transpose(0, 2, 1).reshape(len(normal), -1)
@@ -206,18 +212,3 @@ def _reached(calibration: TactileCalibration) -> tuple[FloatArray, FloatArray]:
     # A height's gradient has the normal's image part pointing the other way.
     normal = -np.sin(steep)[:, None] * np.stack([np.cos(towards), np.sin(towards)], axis=1)
     return normal, calibration.table[row, column].astype(np.float64).transpose(0, 2, 1)
-
-
-def _normal_terms(normal: FloatArray) -> FloatArray:
-    """``(n, 20)``: the smooth model's terms at the image's centre, where of the position's only 1 is left."""
-    terms = design(normal, np.zeros_like(normal))
-    return np.ascontiguousarray(terms[:, ::POSITION_TERMS], dtype=np.float64)
-
-
-def _between(rows: int, columns: int) -> FloatArray:
-    """``(6, 6)`` from the table's coefficients, in pixels, to those of the scaled position."""
-    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0, columns - 1, 3), np.linspace(0, rows - 1, 3)))
-    raw = np.stack([x * x, y * y, x * y, x, y, np.ones_like(x)], axis=1)
-    assert raw.shape[1] == TABLE_TERMS
-    back = np.linalg.pinv(place_terms(scaled_position(x, y, rows, columns)))
-    return np.asarray(back @ raw, dtype=np.float64)

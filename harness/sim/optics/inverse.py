@@ -179,13 +179,15 @@ def _invert_one(image: ByteArray, calibration: TactileCalibration, detection: De
     header = calibration.header
     change = image.astype(np.float64) - calibration.background
     if detection.drifting:
-        change = _without_drift(change, detection)
+        hardly = np.sqrt((change**2).sum(axis=2)) < detection.wide
+        if hardly.mean() >= _MOSTLY:
+            change = change - np.median(change[hardly], axis=0)
     strength = _strength(change, _NARROW)
     quiet = strength < detection.quiet
     if strength.max() < detection.strong and _strength(change, _WIDE).max() < detection.wide:
         nothing = np.zeros(quiet.shape)
         nowhere = np.zeros(quiet.shape, np.bool_)
-        return nothing, nowhere, nowhere, ~nowhere, nothing + _rest_error(header.pitch), True
+        return nothing, nowhere, nowhere, ~nowhere, nothing + _FLOOR * header.pitch, True
     noise = header.residual_rms
     normal, fit = np.empty((*quiet.shape, 2)), np.empty((*quiet.shape, 2))
     normals_from_colour(change, calibration.smooth, header.slope_limit, noise, _RIDGE, normal, fit)
@@ -201,15 +203,13 @@ def _invert_one(image: ByteArray, calibration: TactileCalibration, detection: De
     height = np.maximum(heights, 0.0) * header.pitch
     contact = height > header.skirt.core * height.max()
     spread = fit[..., 1] / flatness**3 * np.hypot(1.0, np.maximum(fit[..., 0], 0.2 * noise))
-    return height, contact, ~rest, trusted, _error(spread, rest, header.pitch), bool(rest.any())
-
-
-def _without_drift(change: FloatArray, detection: Detection) -> FloatArray:
-    hardly = np.sqrt((change**2).sum(axis=2)) < detection.wide
-    if hardly.mean() < _MOSTLY:
-        return change
-    still: FloatArray = change - np.median(change[hardly], axis=0)
-    return still
+    # Independent slope errors add up along the way from where the height is known.
+    way = ndimage.distance_transform_edt(~rest) if rest.any() else np.full(rest.shape, float(max(rest.shape)))
+    variance = ndimage.uniform_filter(spread**2, size=2 * _NARROW + 1, mode="nearest")
+    error: FloatArray = header.pitch * np.hypot(
+        _FLOOR, np.where(rest, 0.0, np.sqrt(variance * way) * _CORRELATED)
+    )
+    return height, contact, ~rest, trusted, error, bool(rest.any())
 
 
 def _strength(change: FloatArray, window: int) -> FloatArray:
@@ -236,15 +236,3 @@ def _resting(heights: FloatArray, quiet: BoolArray) -> BoolArray:
     at_rest = np.concatenate([[False], levels < lowest + _SAME_LEVEL])
     resting: BoolArray = at_rest[labels]
     return resting
-
-
-def _rest_error(pitch: float) -> float:
-    return _FLOOR * pitch
-
-
-def _error(spread: FloatArray, rest: BoolArray, pitch: float) -> FloatArray:
-    # Independent slope errors add up along the way from where the height is known.
-    way = ndimage.distance_transform_edt(~rest) if rest.any() else np.full(rest.shape, float(max(rest.shape)))
-    variance = ndimage.uniform_filter(spread**2, size=2 * _NARROW + 1, mode="nearest")
-    error: FloatArray = pitch * np.hypot(_FLOOR, np.where(rest, 0.0, np.sqrt(variance * way) * _CORRELATED))
-    return error

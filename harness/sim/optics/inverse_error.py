@@ -189,7 +189,13 @@ class _Slopes:
 
     def drawn(self, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
         """One error of the slope, down and right, ``(blocks down, blocks right)`` each."""
-        fields = _functions_of_normal(rng, self._normal, self._alike)
+        width = self._alike * 0.5 * (_NODES - 1)
+        noise = gaussian_filter(rng.normal(size=(4, _NODES, _NODES)), (0.0, width, width), mode="wrap")
+        impulse = np.zeros((_NODES, _NODES))
+        impulse[_NODES // 2, _NODES // 2] = 1.0
+        noise /= np.sqrt(np.mean(gaussian_filter(impulse, width, mode="wrap") ** 2)) * _NODES
+        at = 0.5 * (self._normal.T + 1.0) * (_NODES - 1)
+        fields = np.stack([map_coordinates(one, at, order=1, mode="nearest") for one in noise])
         colour = self._misfit * fields[:3] + rng.normal(0.0, self._camera, (3, len(self._flat)))
         colour += rng.normal() * self._dimming
         if self._light.any():
@@ -205,21 +211,6 @@ class _Slopes:
         picture = np.zeros(self._where.shape)
         picture[self._where] = values
         return picture
-
-
-def _functions_of_normal(rng: np.random.Generator, normal: FloatArray, alike: float) -> FloatArray:
-    """``(4, n)`` of variance one: four smooth random functions of ``(n, 2)`` normals."""
-    width = alike * 0.5 * (_NODES - 1)
-    noise = gaussian_filter(rng.normal(size=(4, _NODES, _NODES)), (0.0, width, width), mode="wrap")
-    noise /= np.sqrt(np.mean(gaussian_filter(_impulse(), width, mode="wrap") ** 2)) * _NODES
-    at = 0.5 * (normal.T + 1.0) * (_NODES - 1)
-    return np.stack([map_coordinates(one, at, order=1, mode="nearest") for one in noise])
-
-
-def _impulse() -> FloatArray:
-    impulse = np.zeros((_NODES, _NODES))
-    impulse[_NODES // 2, _NODES // 2] = 1.0
-    return impulse
 
 
 def _blocks(picture: FloatArray, block: int) -> FloatArray:

@@ -47,7 +47,9 @@ def known_gel(
         WrongUse: an unknown make, or numbers that are missing or contradict each other.
         CalibrationRefused: a calibration that is missing, damaged or of another camera.
     """
-    known = _make(make, calibration)
+    known = None
+    if make is not None or calibration is None:
+        known = described_sensor(DEFAULT_MAKE if make is None else make)
     pack = _pack(known, calibration, pitch, background)
     sensor = _sensor(known, pack.calibration, pitch, thickness)
     if shadow and pack.shadow is None:
@@ -69,12 +71,6 @@ def sensor_like(calibration: TactileCalibration) -> TactileSensor | None:
     return None
 
 
-def _make(name: str | None, calibration: str | None) -> SensorDescription | None:
-    if name is None and calibration is not None:
-        return None
-    return described_sensor(DEFAULT_MAKE if name is None else name)
-
-
 def _pack(
     make: SensorDescription | None, calibration: str | None, pitch: float | None, background: ByteArray | None
 ) -> PublishedPack:
@@ -86,7 +82,22 @@ def _pack(
                 "--sensor"
             )
         return read_published(Path(calibration), stated, background)
-    own = _own(make, calibration)
+    if calibration is None:
+        assert make is not None
+        if make.calibration is None:
+            raise WrongUse(
+                f"no calibration comes with {make.sensor.name}; give one with --calibration FILE_OR_FOLDER, "
+                f'or name it in the sensor\'s file, calibration = "FILE.npz". For one, '
+                f"{how_to_calibrate(make.sensor)}"
+            )
+        own = named_calibration(make.calibration)
+    else:
+        path = Path(calibration)
+        if path.is_dir():
+            raise CalibrationRefused(
+                f"{path} has no {TABLE}; a published calibration is a folder that has one"
+            )
+        own = named_calibration(calibration)
     if background is None:
         return PublishedPack(own, None, shadow_of(own))
     if background.shape != own.background.shape:
@@ -96,22 +107,6 @@ def _pack(
         )
     square = made_square(background, aspect_stated(own.header.made_from))
     return PublishedPack(with_background(own, square), None, shadow_of(own))
-
-
-def _own(make: SensorDescription | None, calibration: str | None) -> TactileCalibration:
-    if calibration is None:
-        assert make is not None
-        if make.calibration is None:
-            raise WrongUse(
-                f"no calibration comes with {make.sensor.name}; give one with --calibration FILE_OR_FOLDER, "
-                f'or name it in the sensor\'s file, calibration = "FILE.npz". For one, '
-                f"{how_to_calibrate(make.sensor)}"
-            )
-        return named_calibration(make.calibration)
-    path = Path(calibration)
-    if path.is_dir():
-        raise CalibrationRefused(f"{path} has no {TABLE}; a published calibration is a folder that has one")
-    return named_calibration(calibration)
 
 
 def _sensor(

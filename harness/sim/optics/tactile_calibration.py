@@ -115,7 +115,30 @@ class TactileCalibration:
     smooth: FloatArray
 
     def __post_init__(self) -> None:
-        _check(self)
+        header, bins = self.header, len(self.table)
+        wanted: list[tuple[str, AnyArray, tuple[int, ...], str]] = [
+            ("background", self.background, (self.rows, self.columns, 3), "uint8"),
+            ("table", self.table, (bins, bins, TABLE_TERMS, 3), "float32"),
+            ("support", self.support, (bins, bins), "bool"),
+            ("smooth", self.smooth, (len(self.smooth), 3), "float64"),
+        ]
+        for name, array, shape, kind in wanted:
+            if array.shape != shape or array.dtype.name != kind:
+                raise CalibrationRefused(
+                    f"{name} is {array.dtype} {array.shape}; a calibration holds {kind} {shape}"
+                )
+            if array.dtype.kind == "f" and not np.isfinite(array).all():
+                raise CalibrationRefused(
+                    f"{name} holds numbers that are not finite; fit the calibration again"
+                )
+        if len(self.smooth) not in (0, smooth_terms()):
+            raise CalibrationRefused(
+                f"smooth has {len(self.smooth)} terms; there are {smooth_terms()}, or none"
+            )
+        if header.channel_order != CHANNEL_ORDER:
+            raise CalibrationRefused(f"channel order {header.channel_order!r} was declared; only RGB is read")
+        if not (header.pitch > 0.0 and 0.0 < header.slope_limit <= 1.0):
+            raise CalibrationRefused(f"pitch {header.pitch} m and slope limit {header.slope_limit} cannot be")
         for name, array in self.arrays.items():
             object.__setattr__(self, name, read_only(np.ascontiguousarray(array)))
 
@@ -147,7 +170,7 @@ class TactileCalibration:
     @cached_property
     def sha256(self) -> str:
         """Hash of header and arrays: the identity of this calibration in a recording."""
-        digest = hashlib.sha256(_header_text(self.header).encode())
+        digest = hashlib.sha256(json.dumps(_written(self.header), sort_keys=True).encode())
         for name, array in sorted(self.arrays.items()):
             digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
             digest.update(array.tobytes())
@@ -229,10 +252,6 @@ def with_background(calibration: TactileCalibration, background: ByteArray) -> T
     return replace(calibration, background=background)
 
 
-def _header_text(header: CalibrationHeader) -> str:
-    return json.dumps(_written(header), sort_keys=True)
-
-
 def _written(header: CalibrationHeader) -> dict[str, Any]:
     """The header as its file has it: what was not measured is left out, so that its hash is as it was."""
     return {name: value for name, value in asdict(header).items() if name != _MISFIT or value is not None}
@@ -255,31 +274,6 @@ def _parse(text: str, path: Path) -> tuple[CalibrationHeader, str]:
         return CalibrationHeader(**inner), str(outer["sha256"])
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise CalibrationRefused(f"{path} has no readable header; fit the calibration again") from error
-
-
-def _check(calibration: TactileCalibration) -> None:
-    header, bins = calibration.header, len(calibration.table)
-    wanted: list[tuple[str, AnyArray, tuple[int, ...], str]] = [
-        ("background", calibration.background, (calibration.rows, calibration.columns, 3), "uint8"),
-        ("table", calibration.table, (bins, bins, TABLE_TERMS, 3), "float32"),
-        ("support", calibration.support, (bins, bins), "bool"),
-        ("smooth", calibration.smooth, (len(calibration.smooth), 3), "float64"),
-    ]
-    for name, array, shape, kind in wanted:
-        if array.shape != shape or array.dtype.name != kind:
-            raise CalibrationRefused(
-                f"{name} is {array.dtype} {array.shape}; a calibration holds {kind} {shape}"
-            )
-        if array.dtype.kind == "f" and not np.isfinite(array).all():
-            raise CalibrationRefused(f"{name} holds numbers that are not finite; fit the calibration again")
-    if len(calibration.smooth) not in (0, smooth_terms()):
-        raise CalibrationRefused(
-            f"smooth has {len(calibration.smooth)} terms; there are {smooth_terms()}, or none"
-        )
-    if header.channel_order != CHANNEL_ORDER:
-        raise CalibrationRefused(f"channel order {header.channel_order!r} was declared; only RGB is read")
-    if not (header.pitch > 0.0 and 0.0 < header.slope_limit <= 1.0):
-        raise CalibrationRefused(f"pitch {header.pitch} m and slope limit {header.slope_limit} cannot be")
 
 
 def smooth_terms() -> int:

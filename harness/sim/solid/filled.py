@@ -86,15 +86,10 @@ def filled(
 def _fine(mesh: Mesh, edge: float, envelope: float | None) -> Tetrahedra:
     """Filled, and once more where it stopped with edges much longer than asked for."""
     found = tetrahedralize(mesh, edge, envelope)
-    if _typical_edge(found) <= _LONGER * edge:
+    ends = found.nodes[found.cells[:, EDGES]]
+    if float(np.sqrt(((ends[:, :, 0] - ends[:, :, 1]) ** 2).sum(axis=2).mean())) <= _LONGER * edge:
         return found
     return tetrahedralize(mesh, edge, envelope, _STRICTER)
-
-
-def _typical_edge(of: Tetrahedra) -> float:
-    """Metres: root mean square over the edges of all cells."""
-    ends = of.nodes[of.cells[:, EDGES]]
-    return float(np.sqrt(((ends[:, :, 0] - ends[:, :, 1]) ** 2).sum(axis=2).mean()))
 
 
 def with_edges_below(mesh: Mesh, longest: float) -> Mesh:
@@ -110,7 +105,8 @@ def with_edges_below(mesh: Mesh, longest: float) -> Mesh:
     Raises:
         WrongUse: a length outside of that range.
     """
-    greatest = _longest_edge(mesh)
+    ahead = mesh.corners[:, (1, 2, 0)]
+    greatest = float(((ahead - mesh.corners) ** 2).sum(axis=2).max() ** 0.5)
     if not longest > greatest * 2.0**-_HALVINGS:
         raise WrongUse(
             f"edges of {greatest:.3g} m cannot be divided into parts of {longest!r} m; give a length above "
@@ -125,8 +121,3 @@ def with_edges_below(mesh: Mesh, longest: float) -> Mesh:
         mesh.vertices, mesh.faces, longest, max_iter=2 * _HALVINGS
     )
     return Mesh(vertices, faces)
-
-
-def _longest_edge(mesh: Mesh) -> float:
-    ahead = mesh.corners[:, (1, 2, 0)]
-    return float(((ahead - mesh.corners) ** 2).sum(axis=2).max() ** 0.5)

@@ -219,19 +219,15 @@ def _cleaned(raw: RawMesh, name: str) -> RepairedSurface:
     weld(surface)
     drop_collapsed(surface)
     drop_duplicates(surface)
-    _check_surface(surface, name)
-    drop_specks(surface)
-    take_apart(surface)
-    return surface
-
-
-def _check_surface(surface: RepairedSurface, name: str) -> None:
     area = float(surface.areas().sum())
     if len(surface.faces) < 4 or not area > 1e-13 * surface.size**2:
         raise MeshRefused(
             f"{name}: {len(surface.faces)} faces with a total area of {area:.1e} (size {surface.size:.3g}) "
             "remain after welding; at least 4 faces with an area make an object"
         )
+    drop_specks(surface)
+    take_apart(surface)
+    return surface
 
 
 def _closed(surface: RepairedSurface) -> tuple[int, bool]:

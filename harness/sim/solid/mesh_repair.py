@@ -95,7 +95,11 @@ def drop_duplicates(surface: RepairedSurface) -> None:
     )
     once = np.zeros(len(surface.faces), dtype=np.bool_)
     once[first] = True
-    balance = np.bincount(inverse.ravel(), _parity(surface.faces), minlength=len(groups))
+    # Parity: +1 for a face whose corners are a rotation of their sorted order, -1 for its mirror image.
+    start = np.argmin(surface.faces, axis=1)[:, None]
+    rolled = np.take_along_axis(surface.faces, (start + np.arange(3)) % 3, axis=1)
+    parity = np.where(rolled[:, 1] < rolled[:, 2], 1.0, -1.0)
+    balance = np.bincount(inverse.ravel(), parity, minlength=len(groups))
     count = np.bincount(inverse.ravel(), minlength=len(groups))
     flap = (count > 1) & (balance == 0)
     without = once.copy()
@@ -105,18 +109,13 @@ def drop_duplicates(surface: RepairedSurface) -> None:
     _drop(surface, once, "duplicate faces")
 
 
-def _parity(faces: IntArray) -> FloatArray:
-    """+1 for a face whose corners are a rotation of their sorted order, -1 for its mirror image."""
-    rolled = np.take_along_axis(faces, (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3, axis=1)
-    return np.where(rolled[:, 1] < rolled[:, 2], 1.0, -1.0)
-
-
 def drop_specks(surface: RepairedSurface) -> None:
     """Drop separate crumbs: small, nearly without area, and not the most of the surface."""
     body = bodies(surface)
     area = np.bincount(body, surface.areas())
-    small = np.array([_extent(surface, body == k) for k in range(len(area))]) < _SPECK_SIZE * surface.size
-    speck = small & (area < _SPECK_AREA * area.sum())
+    corners = surface.corners
+    extents = [float(np.ptp(corners[body == k].reshape(-1, 3), axis=0).max()) for k in range(len(area))]
+    speck = (np.array(extents) < _SPECK_SIZE * surface.size) & (area < _SPECK_AREA * area.sum())
     if speck.any() and area[speck].sum() < 0.02 * area.sum():
         surface.keep(~speck[body])
         surface.repairs.append(f"removed {int(speck.sum())} floating specks")
@@ -185,10 +184,6 @@ def _graph(pairs: IntArray, size: int) -> coo_array:
     return coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
 
 
-def _extent(surface: RepairedSurface, faces: BoolArray) -> float:
-    return float(np.ptp(surface.corners[faces].reshape(-1, 3), axis=0).max())
-
-
 def _is_closed(faces: IntArray) -> bool:
     return len(boundary_edges(faces)) == 0
 
@@ -247,11 +242,26 @@ def fill_holes(surface: RepairedSurface) -> None:
     Larger ones are mouths of vessels as often as damage: they stay.
     """
     filled, slits = 0, 0
-    for loop in _loops(boundary_edges(surface.faces)):
+    # Closed walks along directed boundary edges; places where two rims touch are left alone.
+    edges = boundary_edges(surface.faces)
+    starts, times = np.unique(edges[:, 0], return_counts=True)
+    following = {int(a): int(b) for a, b in edges}
+    forked = set(starts[times > 1].tolist())
+    loops = []
+    while following:
+        walk = [next(iter(following))]
+        while (step := following.pop(walk[-1], None)) is not None and step != walk[0]:
+            walk.append(step)
+        if step == walk[0] and len(walk) >= 3 and not forked.intersection(walk):
+            loops.append(np.array(walk, dtype=np.int64))
+    for loop in loops:
         rim = surface.vertices[loop]
         if float(np.ptp(rim, axis=0).max()) > _LARGEST_HOLE * surface.size:
             continue
-        if _fan_area(rim) < 1e-3 * float(np.ptp(rim, axis=0).max()) ** 2:
+        middle = rim.mean(axis=0)
+        spokes = rim - middle
+        fan_area = 0.5 * np.linalg.norm(np.cross(spokes, np.roll(rim, -1, axis=0) - middle), axis=1).sum()
+        if fan_area < 1e-3 * float(np.ptp(rim, axis=0).max()) ** 2:
             slits += 1
             continue
         hub = len(surface.vertices)
@@ -300,49 +310,12 @@ def _solid(vertices: FloatArray, faces: IntArray) -> Manifold:
     )
 
 
-def _loops(edges: IntArray) -> list[IntArray]:
-    """Closed walks along directed boundary edges; places where two rims touch are left alone."""
-    starts, times = np.unique(edges[:, 0], return_counts=True)
-    following = {int(a): int(b) for a, b in edges}
-    forked = set(starts[times > 1].tolist())
-    loops = []
-    while following:
-        walk = [next(iter(following))]
-        while (step := following.pop(walk[-1], None)) is not None and step != walk[0]:
-            walk.append(step)
-        if step == walk[0] and len(walk) >= 3 and not forked.intersection(walk):
-            loops.append(np.array(walk, dtype=np.int64))
-    return loops
-
-
-def _fan_area(rim: FloatArray) -> float:
-    middle = rim.mean(axis=0)
-    return float(
-        0.5 * np.linalg.norm(np.cross(rim - middle, np.roll(rim, -1, axis=0) - middle), axis=1).sum()
-    )
-
-
 def take_apart(surface: RepairedSurface) -> None:
     """Give solids that touch in an edge, a point or a face a surface each, where each is closed by itself.
 
     Around an edge of more than two faces those are neighbours that have material between them, by the way
     that the file's faces turn. Where that does not make closed solids, nothing is changed.
     """
-    solid = _solids(surface)
-    count = int(solid.max()) + 1
-    if count == int(bodies(surface).max()) + 1:
-        return
-    if any(len(boundary_edges(surface.faces[solid == k])) for k in range(count)):
-        return
-    keys = solid[:, None] * len(surface.vertices) + surface.faces
-    used, faces = np.unique(keys, return_inverse=True)
-    surface.vertices = surface.vertices[used % len(surface.vertices)]
-    surface.faces = faces.reshape(-1, 3).astype(np.int64)
-    surface.repairs.append(f"took {count} solids apart that meet in an edge, a point or a face")
-
-
-def _solids(surface: RepairedSurface) -> IntArray:
-    """``(m,)``: which solid each face bounds, from 0."""
     faces, count = surface.faces, len(surface.faces)
     directed = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     forward = directed[:, 0] < directed[:, 1]
@@ -358,7 +331,17 @@ def _solids(surface: RepairedSurface) -> IntArray:
         pairs.append(owner[around][joined])
     joined_faces = np.concatenate(pairs)
     graph = coo_array((np.ones(len(joined_faces)), tuple(joined_faces.T)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    solid = np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    count = int(solid.max()) + 1
+    if count == int(bodies(surface).max()) + 1:
+        return
+    if any(len(boundary_edges(surface.faces[solid == k])) for k in range(count)):
+        return
+    keys = solid[:, None] * len(surface.vertices) + surface.faces
+    used, faces = np.unique(keys, return_inverse=True)
+    surface.vertices = surface.vertices[used % len(surface.vertices)]
+    surface.faces = faces.reshape(-1, 3).astype(np.int64)
+    surface.repairs.append(f"took {count} solids apart that meet in an edge, a point or a face")
 
 
 def _angles(surface: RepairedSurface, edge: IntArray, around: IntArray) -> FloatArray:

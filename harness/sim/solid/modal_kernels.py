@@ -43,13 +43,6 @@ MASS_WEIGHTS = read_only(
 """``(14,)``, as shares of the volume: they add up to 1."""
 
 
-def shape_values(shares: FloatArray) -> FloatArray:
-    """``(q, 10)`` shape functions at ``(q, 4)`` barycentric coordinates."""
-    corners = shares * (2.0 * shares - 1.0)
-    middles = 4.0 * shares[:, EDGES[:, 0]] * shares[:, EDGES[:, 1]]
-    return np.concatenate([corners, middles], axis=1)
-
-
 def shape_slopes(shares: FloatArray) -> FloatArray:
     """``(q, 10, 3)`` slopes of the shape functions along the reference coordinates.
 

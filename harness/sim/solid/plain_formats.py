@@ -224,7 +224,11 @@ def _absolute(number: int, so_far: int, name: str) -> int:
 def _first_number(used: IntArray, count: int, relative: bool, name: str) -> tuple[int, tuple[str, ...]]:
     """The number of the first vertex, and what is odd of it."""
     if not len(used) or used.min() > 0:
-        _refuse_beyond(used, count, name)
+        if len(used) and used.max() > count:
+            raise MeshRefused(
+                f"{name} has a face with vertex {used.max()}, but {count} vertices; the file is cut short or "
+                "damaged, export it again"
+            )
         return 1, ()
     if relative or used.max() >= count:
         raise MeshRefused(
@@ -232,14 +236,6 @@ def _first_number(used: IntArray, count: int, relative: bool, name: str) -> tupl
             "from 1, and this one from neither 0 nor 1; export it again"
         )
     return 0, ("its faces count vertices from 0, where an OBJ counts from 1: taken as they are meant",)
-
-
-def _refuse_beyond(used: IntArray, count: int, name: str) -> None:
-    if len(used) and used.max() > count:
-        raise MeshRefused(
-            f"{name} has a face with vertex {used.max()}, but {count} vertices; the file is cut short or "
-            "damaged, export it again"
-        )
 
 
 def _counted(words: list[bytes], points: int, name: str, line: int) -> list[int]:
@@ -321,7 +317,14 @@ def read_ply(path: Path) -> PlainMesh:
     is_text = [b"format", b"ascii"] in [words[:2] for words in header]
     if is_text:
         data = plain_bytes(data, path, MeshRefused)
-        _check_text(data, path.name)
+        # Refuse lines that the library would read in part: it stops at the first word that is not a number.
+        require_few(data.count(b"\n") // 2, "vertices or faces", path.name)
+        start = data.find(b"end_header")
+        comma = data.find(b",", max(start, 0))
+        if comma >= 0:
+            line = data.count(b"\n", 0, comma) + 1
+            words = data[data.rfind(b"\n", 0, comma) + 1 : data.find(b"\n", comma)].split()
+            raise refuse_number(words, path.name, line, "numbers")
     counts = [int(words[2]) for words in header if words[:1] == [b"element"] and len(words) == 3]
     require_few(max(counts, default=0), "vertices or faces", path.name)
     lines = data.count(b"\n") + 1
@@ -341,17 +344,6 @@ def read_ply(path: Path) -> PlainMesh:
     )
     vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
     return PlainMesh(vertices, faces, single=single and not is_text)
-
-
-def _check_text(data: bytes, name: str) -> None:
-    """Refuse lines that the library would read in part: it stops at the first word that is not a number."""
-    require_few(data.count(b"\n") // 2, "vertices or faces", name)
-    start = data.find(b"end_header")
-    comma = data.find(b",", max(start, 0))
-    if comma >= 0:
-        line = data.count(b"\n", 0, comma) + 1
-        words = data[data.rfind(b"\n", 0, comma) + 1 : data.find(b"\n", comma)].split()
-        raise refuse_number(words, name, line, "numbers")
 
 
 def _check_counts(data: bytes, name: str) -> None:

@@ -39,7 +39,16 @@ def rim_faces(surface: Mesh, wall: float) -> IntArray:
         surface: closed, of faces no wider than the wall or so.
         wall: m, typical of the object.
     """
-    at_edge = _sharp_vertices(surface)[surface.faces].any(axis=1)
+    faces = surface.faces
+    ends = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    order = np.lexsort((ends[:, 1], ends[:, 0]))
+    ends, face = ends[order], order % len(faces)
+    same = (ends[1:] == ends[:-1]).all(axis=1)
+    normals = surface.face_normals
+    cosine = np.einsum("ij,ij->i", normals[face[1:][same]], normals[face[:-1][same]])
+    sharp = np.zeros(len(surface.vertices), dtype=np.bool_)
+    sharp[ends[1:][same][cosine < _SHARP]] = True
+    at_edge = sharp[surface.faces].any(axis=1)
     asked = np.flatnonzero(at_edge)
     middles = surface.corners[asked].mean(axis=1)
     return asked[wall_thickness(surface, middles, surface.face_normals[asked]) > _DEEP * wall]
@@ -100,7 +109,13 @@ def _split(cut: _Cut, across: BoolArray) -> _Cut:
     All cells of an edge are cut at once, so that they still meet; what is left to cut is left for later.
     """
     ends = np.sort(cut.cells[:, EDGES], axis=2)
-    rank, edges = _ranked(cut, ends, across)
+    pairs, which = np.unique(ends[across], axis=0, return_inverse=True)
+    length = np.linalg.norm(cut.nodes[pairs[:, 0]] - cut.nodes[pairs[:, 1]], axis=1)
+    place = np.empty(len(pairs), dtype=np.int64)
+    place[np.argsort(-length, kind="stable")] = np.arange(len(pairs))
+    rank = np.full(across.shape, len(pairs))
+    rank[across] = place[which.reshape(-1)]
+    edges = len(pairs)
     first = rank.min(axis=1)
     agreed = np.ones(edges + 1, dtype=np.bool_)
     agreed[edges] = False
@@ -119,28 +134,3 @@ def _split(cut: _Cut, across: BoolArray) -> _Cut:
         np.concatenate([np.delete(cut.cells, split, axis=0), *halves]),
         np.concatenate([cut.field, np.ones(len(which))]),
     )
-
-
-def _ranked(cut: _Cut, ends: IntArray, across: BoolArray) -> tuple[IntArray, int]:
-    """``(c, 6)`` ranks of edges to be cut, the longest first, and how many there are: the rank of others."""
-    pairs, which = np.unique(ends[across], axis=0, return_inverse=True)
-    length = np.linalg.norm(cut.nodes[pairs[:, 0]] - cut.nodes[pairs[:, 1]], axis=1)
-    place = np.empty(len(pairs), dtype=np.int64)
-    place[np.argsort(-length, kind="stable")] = np.arange(len(pairs))
-    rank = np.full(across.shape, len(pairs))
-    rank[across] = place[which.reshape(-1)]
-    return rank, len(pairs)
-
-
-def _sharp_vertices(surface: Mesh) -> BoolArray:
-    """``(n,)``: whether a sharp edge ends there."""
-    faces = surface.faces
-    ends = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    order = np.lexsort((ends[:, 1], ends[:, 0]))
-    ends, face = ends[order], order % len(faces)
-    same = (ends[1:] == ends[:-1]).all(axis=1)
-    normals = surface.face_normals
-    cosine = np.einsum("ij,ij->i", normals[face[1:][same]], normals[face[:-1][same]])
-    sharp = np.zeros(len(surface.vertices), dtype=np.bool_)
-    sharp[ends[1:][same][cosine < _SHARP]] = True
-    return sharp

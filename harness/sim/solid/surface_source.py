@@ -40,18 +40,14 @@ def surface_of(mesh: str, units: str | None, wall: float | None, up_axis: str | 
         WrongUse: no such file or built-in object; units or a wall that cannot be.
     """
     if mesh.startswith(BUILTIN):
-        return _builtin(mesh, units, wall, up_axis)
+        if wall is not None:
+            raise WrongUse(f"{mesh} has its walls; leave --wall out")
+        if units not in (None, "m"):
+            raise WrongUse(f"{mesh} is in metres and not in {units}; leave --units out")
+        if up_axis is not None:
+            raise WrongUse(f"{mesh} has z up; leave --up-axis out")
+        return TakenSurface(build(mesh.removeprefix(BUILTIN)), "m", ())
     intake = take_in(Path(mesh), units, wall=wall, up_axis=up_axis)
     report = intake.report
     said = (report.summary, *report.repairs, *report.warnings)
     return TakenSurface(walled(intake.mesh, wall), report.units, said)
-
-
-def _builtin(mesh: str, units: str | None, wall: float | None, up_axis: str | None) -> TakenSurface:
-    if wall is not None:
-        raise WrongUse(f"{mesh} has its walls; leave --wall out")
-    if units not in (None, "m"):
-        raise WrongUse(f"{mesh} is in metres and not in {units}; leave --units out")
-    if up_axis is not None:
-        raise WrongUse(f"{mesh} has z up; leave --up-axis out")
-    return TakenSurface(build(mesh.removeprefix(BUILTIN)), "m", ())

@@ -109,7 +109,13 @@ def tetrahedra(nodes: FloatArray, cells: IntArray) -> Tetrahedra:
         )
     volumes = signed_volumes(nodes, cells)
     cells[volumes < 0.0] = cells[volumes < 0.0][:, [0, 2, 1, 3]]
-    _check_slivers(nodes, cells)
+    quality = fullness(nodes, cells)
+    bad = int(np.count_nonzero(quality < FLATTEST))
+    if bad:
+        raise MeshRefused(
+            f"{bad} of {len(cells)} tetrahedra are flat (the worst has {quality.min():.1e} of its edges' "
+            f"volume, the least is {FLATTEST:g}); mesh the object again, or collapse them"
+        )
     boundary_faces(cells)
     return Tetrahedra(read_only(nodes), read_only(cells))
 
@@ -156,13 +162,6 @@ def tetrahedralize(
 
 
 def _filled_whole(mesh: Mesh, edge: float, envelope: float, stop: float) -> Tetrahedra:
-    found = tetrahedra(*_filled(mesh, edge, envelope, stop))
-    _check_volume(found, mesh, edge, envelope)
-    _check_bodies(found, mesh, edge)
-    return found
-
-
-def _filled(mesh: Mesh, edge: float, envelope: float, stop: float) -> tuple[FloatArray, IntArray]:
     from pytetwild.pytetwild import tetrahedralize as fill
 
     fewer = _simplified(mesh, _SIMPLIFIED * envelope)
@@ -178,7 +177,27 @@ def _filled(mesh: Mesh, edge: float, envelope: float, stop: float) -> tuple[Floa
             num_threads=1,
             vtk_ordering=True,
         )
-    return np.asarray(nodes, dtype=np.float64), np.asarray(cells, dtype=np.int64)
+    found = tetrahedra(np.asarray(nodes, dtype=np.float64), np.asarray(cells, dtype=np.int64))
+    wanted, got = enclosed_volume(mesh), float(found.volumes.sum())
+    if not abs(got - wanted) <= _VOLUME_GATE * wanted:
+        raise _Lost(
+            f"the tetrahedra hold {got * 1e6:.4g} cm^3 where the surface encloses {wanted * 1e6:.4g}, more "
+            f"than {_VOLUME_GATE:.0%} apart, with edges of {edge * 1e3:.3g} mm at an envelope of "
+            f"{envelope * 1e3:.3g} mm, the finest that were tried; repair the surface"
+        )
+    ends = mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]]
+    rows, columns = (np.concatenate([pair[:, k] for pair in ends]) for k in (0, 1))
+    graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(mesh.vertices),) * 2)
+    number = connected_components(graph, directed=False)[1]
+    pieces = len(np.unique(number[np.unique(mesh.faces)]))
+    bodies = joined_by_faces(found.cells)
+    if bodies > pieces:
+        raise _Lost(
+            f"the tetrahedra fall into {bodies} bodies where the surface has {pieces}: a thin neck, or "
+            f"an edge only, was lost even with elements of {edge * 1e3:.3g} mm, the finest that were tried; "
+            "thicken it"
+        )
+    return found
 
 
 def _simplified(mesh: Mesh, tolerance: float) -> Mesh:
@@ -221,16 +240,6 @@ def fullness(nodes: FloatArray, cells: IntArray) -> FloatArray:
     return np.abs(signed_volumes(nodes, cells)) / np.where(squares > 0.0, squares, 1.0) ** 1.5
 
 
-def _check_slivers(nodes: FloatArray, cells: IntArray) -> None:
-    quality = fullness(nodes, cells)
-    bad = int(np.count_nonzero(quality < FLATTEST))
-    if bad:
-        raise MeshRefused(
-            f"{bad} of {len(cells)} tetrahedra are flat (the worst has {quality.min():.1e} of its edges' "
-            f"volume, the least is {FLATTEST:g}); mesh the object again, or collapse them"
-        )
-
-
 def check_closed(mesh: Mesh) -> None:
     """Refuse a surface without an inside.
 
@@ -256,35 +265,6 @@ def _open_area(mesh: Mesh, rim: IntArray) -> float:
         spokes = mine - mine.reshape(-1, 3).mean(axis=0)
         area += 0.5 * float(np.linalg.norm(np.cross(spokes[:, 0], spokes[:, 1]), axis=1).sum())
     return area
-
-
-def _check_volume(found: Tetrahedra, mesh: Mesh, edge: float, envelope: float) -> None:
-    wanted, got = enclosed_volume(mesh), float(found.volumes.sum())
-    if not abs(got - wanted) <= _VOLUME_GATE * wanted:
-        raise _Lost(
-            f"the tetrahedra hold {got * 1e6:.4g} cm^3 where the surface encloses {wanted * 1e6:.4g}, more "
-            f"than {_VOLUME_GATE:.0%} apart, with edges of {edge * 1e3:.3g} mm at an envelope of "
-            f"{envelope * 1e3:.3g} mm, the finest that were tried; repair the surface"
-        )
-
-
-def _check_bodies(found: Tetrahedra, mesh: Mesh, edge: float) -> None:
-    """No body that the surface has not: a thin neck that tore is one, and so is what hangs by an edge only.
-
-    Such a hinge has no stiffness, and its motion a frequency of zero.
-    """
-    ends = mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]]
-    rows, columns = (np.concatenate([pair[:, k] for pair in ends]) for k in (0, 1))
-    graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(mesh.vertices),) * 2)
-    number = connected_components(graph, directed=False)[1]
-    pieces = len(np.unique(number[np.unique(mesh.faces)]))
-    bodies = joined_by_faces(found.cells)
-    if bodies > pieces:
-        raise _Lost(
-            f"the tetrahedra fall into {bodies} bodies where the surface has {pieces}: a thin neck, or "
-            f"an edge only, was lost even with elements of {edge * 1e3:.3g} mm, the finest that were tried; "
-            "thicken it"
-        )
 
 
 def joined_by_faces(cells: IntArray) -> int:

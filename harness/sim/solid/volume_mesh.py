@@ -179,11 +179,19 @@ def _compacted(
 def _oriented(nodes: FloatArray, cells: IntArray) -> tuple[QuadraticMesh, tuple[str, ...], float]:
     """Cells turned the right way and checked, and what was done."""
     said: list[str] = []
-    check_full(nodes, cells)
+    fullnesses = fullness(nodes, cells[:, :4])
+    if fullnesses.min() < FLATTEST:
+        raise MeshRefused(
+            f"{named(fullnesses < FLATTEST)} of {len(cells)} are flat (the worst quality is "
+            f"{REGULAR * fullnesses.min():.1e}, the least allowed {REGULAR * FLATTEST:.1e}, a regular one's 1): "
+            "the stiffness would lose its digits; collapse them, or mesh the object again"
+        )
     if cells.shape[1] == 10:
         cells = ordered_middles(nodes, cells, said)
         check_shared(cells)
-    cells, reversed_ = turned(nodes, cells)
+    reversed_ = signed_volumes(nodes, cells) < 0.0
+    order = _REVERSED[: cells.shape[1]]
+    cells = np.where(reversed_[:, None], cells[:, order], cells)
     check_overlap(cells, reversed_)
     if reversed_.any() and not reversed_.all():
         said.append(f"{int(reversed_.sum())} elements were numbered the other way round and are turned")
@@ -214,28 +222,6 @@ def named(chosen: BoolArray) -> str:
     listed = ", ".join(str(number) for number in numbers[:_NAMED])
     more = f" and {len(numbers) - _NAMED} more" if len(numbers) > _NAMED else ""
     return f"element{'s' if len(numbers) > 1 else ''} {listed}{more}"
-
-
-def check_full(nodes: FloatArray, cells: IntArray) -> None:
-    """Refuse flat cells.
-
-    Raises:
-        MeshRefused: with their numbers and the worst one's quality.
-    """
-    quality = fullness(nodes, cells[:, :4])
-    if quality.min() < FLATTEST:
-        raise MeshRefused(
-            f"{named(quality < FLATTEST)} of {len(cells)} are flat (the worst quality is "
-            f"{REGULAR * quality.min():.1e}, the least allowed {REGULAR * FLATTEST:.1e}, a regular one's 1): "
-            "the stiffness would lose its digits; collapse them, or mesh the object again"
-        )
-
-
-def turned(nodes: FloatArray, cells: IntArray) -> tuple[IntArray, BoolArray]:
-    """Cells of four or ten nodes, all positively oriented, and ``(c,)`` which were not."""
-    reversed_ = signed_volumes(nodes, cells) < 0.0
-    order = _REVERSED[: cells.shape[1]]
-    return np.where(reversed_[:, None], cells[:, order], cells), reversed_
 
 
 def check_overlap(cells: IntArray, reversed_: BoolArray) -> None:

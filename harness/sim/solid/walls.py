@@ -3,7 +3,7 @@
 import numpy as np
 from manifold3d import Manifold
 
-from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.basics.arrays import FloatArray
 from harness.basics.errors import MeshRefused
 from harness.basics.faces.mesh_rays import column_crossings
 from harness.basics.mesh import Mesh, signed_volume
@@ -34,29 +34,20 @@ def walled(mesh: Mesh, wall: float | None) -> Mesh:
     if wall is None:
         return mesh
     if len(boundary_edges(mesh.faces)):
-        return _thickened(mesh, wall)
+        # Both sides of an open surface, joined along its rim.
+        offset = 0.5 * wall * mesh.vertex_normals
+        count = len(mesh.vertices)
+        edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        _, which, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+        rim = np.asarray(edges[counts[which.ravel()] == 1])
+        a, b = rim[:, 0], rim[:, 1]
+        sides = [np.stack(side, axis=1) for side in ((b, a, a + count), (b, a + count, b + count))]
+        faces = np.concatenate([mesh.faces, mesh.faces[:, ::-1] + count, *sides])
+        return outward(Mesh(np.concatenate([mesh.vertices + offset, mesh.vertices - offset]), faces))
     # Level sets have float32 coordinates: far from the origin they lose the wall.
     centre = mesh.vertices[0]
     cavity = _cavity(Mesh(mesh.vertices - centre, mesh.faces), wall)
     return _joined(mesh, Mesh(cavity.vertices + centre, cavity.faces))
-
-
-def _thickened(mesh: Mesh, wall: float) -> Mesh:
-    """Both sides of an open surface, joined along its rim."""
-    offset = 0.5 * wall * mesh.vertex_normals
-    count = len(mesh.vertices)
-    rim = _directed_rim(mesh.faces)
-    a, b = rim[:, 0], rim[:, 1]
-    sides = [np.stack(side, axis=1) for side in ((b, a, a + count), (b, a + count, b + count))]
-    faces = np.concatenate([mesh.faces, mesh.faces[:, ::-1] + count, *sides])
-    return outward(Mesh(np.concatenate([mesh.vertices + offset, mesh.vertices - offset]), faces))
-
-
-def _directed_rim(faces: IntArray) -> IntArray:
-    """``(e, 2)``: edges of one face only, as that face walks them."""
-    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    _, which, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
-    return np.asarray(edges[counts[which.ravel()] == 1])
 
 
 def _cavity(mesh: Mesh, wall: float) -> Mesh:
@@ -65,7 +56,26 @@ def _cavity(mesh: Mesh, wall: float) -> Mesh:
     low, high = mesh.bounds
     counts = np.ceil((high - low) / cell).astype(np.int64) + 3
     origin = low - cell
-    depth = _depths(mesh, origin, cell, counts, wall)
+    # Metres beneath the surface at the corners of a grid; outside below zero, far away held.
+    axes = [origin[axis] + cell * np.arange(counts[axis]) for axis in range(3)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    far = wall + 3.0 * cell
+    places, faces = nearest_on_surface(
+        mesh, points, np.broadcast_to([0.0, 0.0, 1.0], points.shape).copy(), np.full(len(points), far)
+    )
+    gap = np.where(faces >= 0, np.linalg.norm(points - places, axis=1), far)
+    # Which corners of the grid the surface encloses, by where vertical lines cross it.
+    nudge = cell * np.array([1.1e-5, 1.7e-5])
+    line, height, sign = column_crossings(
+        mesh.corners, origin[:2] + nudge, np.array([cell, cell]), counts[:2].copy()
+    )
+    # A point is wound as often as faces above it look up less those that look down.
+    above = np.zeros((counts[0] * counts[1], counts[2] + 1), dtype=np.int64)
+    level = np.clip(np.ceil((height - origin[2]) / cell).astype(np.int64), 0, counts[2])
+    np.add.at(above, (line, level), sign)
+    winding = above.sum(axis=1, keepdims=True) - np.cumsum(above, axis=1)
+    gap = gap.reshape(counts)
+    depth = np.where(winding[:, : counts[2]].reshape(counts) >= 1, gap, -gap)
     inside = Manifold.level_set(
         _Sampled(depth / _MM, origin / _MM, cell / _MM),
         [*(low / _MM), *(high / _MM)],
@@ -79,32 +89,6 @@ def _cavity(mesh: Mesh, wall: float) -> Mesh:
         )
     smooth = from_manifold(inside.simplify(0.02 * wall / _MM))
     return Mesh(smooth.vertices * _MM, smooth.faces[:, ::-1])
-
-
-def _depths(mesh: Mesh, origin: FloatArray, cell: float, counts: IntArray, wall: float) -> FloatArray:
-    """Metres beneath the surface at the corners of a grid; outside below zero, far away held."""
-    axes = [origin[axis] + cell * np.arange(counts[axis]) for axis in range(3)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    far = wall + 3.0 * cell
-    places, faces = nearest_on_surface(
-        mesh, points, np.broadcast_to([0.0, 0.0, 1.0], points.shape).copy(), np.full(len(points), far)
-    )
-    gap = np.where(faces >= 0, np.linalg.norm(points - places, axis=1), far)
-    return np.where(_inside(mesh, origin, cell, counts), gap.reshape(counts), -gap.reshape(counts))
-
-
-def _inside(mesh: Mesh, origin: FloatArray, cell: float, counts: IntArray) -> BoolArray:
-    """Which corners of the grid the surface encloses, by where vertical lines cross it."""
-    nudge = cell * np.array([1.1e-5, 1.7e-5])
-    line, height, sign = column_crossings(
-        mesh.corners, origin[:2] + nudge, np.array([cell, cell]), counts[:2].copy()
-    )
-    # A point is wound as often as faces above it look up less those that look down.
-    above = np.zeros((counts[0] * counts[1], counts[2] + 1), dtype=np.int64)
-    level = np.clip(np.ceil((height - origin[2]) / cell).astype(np.int64), 0, counts[2])
-    np.add.at(above, (line, level), sign)
-    winding = above.sum(axis=1, keepdims=True) - np.cumsum(above, axis=1)
-    return np.asarray(winding[:, : counts[2]].reshape(counts) >= 1)
 
 
 class _Sampled:

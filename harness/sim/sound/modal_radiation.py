@@ -34,7 +34,10 @@ def radiation(modes: Modes, distance: float) -> FloatArray:
     if not (np.isfinite(distance) and distance > 0.0):
         raise WrongUse(f"a microphone {distance:g} m from the object hears nothing; say a distance above 0")
     omega = 2.0 * np.pi * modes.frequencies
-    areas = _node_areas(modes)
+    areas = np.zeros(len(modes.points))
+    faces = Mesh(modes.points, modes.faces)
+    for corner in range(3):
+        np.add.at(areas, modes.faces[:, corner], faces.face_areas / 3.0)
     outward = np.einsum("nmd,nd->nm", modes.shapes, modes.normals)
     per_volume = AIR_DENSITY * omega / (4.0 * np.pi * distance)
     return np.asarray(per_volume * _flow(modes, areas[:, None] * outward, omega / SPEED_OF_SOUND))
@@ -43,26 +46,13 @@ def radiation(modes: Modes, distance: float) -> FloatArray:
 def _flow(modes: Modes, flow: FloatArray, wavenumbers: FloatArray) -> FloatArray:
     """``(m,)``: rms over directions of ``(n, m)`` flows added up with their delays."""
     middle = modes.points.mean(axis=0)
-    ahead = (modes.points - middle) @ _sphere(_DIRECTIONS).T
+    height = 1.0 - (2.0 * np.arange(_DIRECTIONS) + 1.0) / _DIRECTIONS
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(_DIRECTIONS)
+    radius = np.sqrt(1.0 - height**2)
+    directions = np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)
+    ahead = (modes.points - middle) @ directions.T
     total = np.zeros(len(wavenumbers))
     for mode, wavenumber in enumerate(wavenumbers):
         phase = wavenumber * ahead
         total[mode] = np.mean((flow[:, mode] @ np.cos(phase)) ** 2 + (flow[:, mode] @ np.sin(phase)) ** 2)
     return np.sqrt(total)
-
-
-def _node_areas(modes: Modes) -> FloatArray:
-    """``(n,)`` m^2: a third of the faces at each node."""
-    areas = np.zeros(len(modes.points))
-    faces = Mesh(modes.points, modes.faces)
-    for corner in range(3):
-        np.add.at(areas, modes.faces[:, corner], faces.face_areas / 3.0)
-    return areas
-
-
-def _sphere(count: int) -> FloatArray:
-    """``(count, 3)`` unit directions, evenly spread on a spiral."""
-    height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
-    turn = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(count)
-    radius = np.sqrt(1.0 - height**2)
-    return np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)

@@ -100,7 +100,15 @@ def ring(
     Raises:
         WrongUse: shapes that do not belong together, or numbers that are not finite.
     """
-    _check(frequencies, dampings, amplitudes, force, rate)
+    check_rate(rate)
+    if force.ndim != 2 or len(amplitudes) != len(force):
+        raise WrongUse(
+            f"amplitudes {amplitudes.shape} and force {force.shape} do not belong together; they are "
+            "(k, m) and (k, t)"
+        )
+    if not np.isfinite(force).all():
+        raise WrongUse("a force is not a finite number; nothing rings")
+    check_modes(frequencies, dampings, amplitudes)
     heard = audible(frequencies, rate)
     heavy = heard & is_heavy(frequencies, dampings)
     light = heard & ~heavy
@@ -144,7 +152,9 @@ def _blocks(
     for strike in range(count):
         held = parts[strike] * states[strike]
         sound[strike] = held.real @ table.imag + held.imag @ table.real
-        sound[strike] += padded[strike] @ _shifted(own[strike])
+        kernel = own[strike]
+        later = np.arange(len(kernel)) - np.arange(len(kernel))[:, None]
+        sound[strike] += padded[strike] @ np.where(later >= 0, kernel[np.maximum(later, 0)], 0.0)
     return sound.reshape(count, -1)[:, :samples]
 
 
@@ -154,12 +164,6 @@ def _powers(exponents: AnyArray, steps: AnyArray) -> AnyArray:
     powers: AnyArray = np.exp(arguments)
     powers[arguments.real < _LOWEST] = 0.0
     return powers
-
-
-def _shifted(kernel: FloatArray) -> FloatArray:
-    """``(b, b)``: row ``i`` is the kernel from column ``i`` on."""
-    later = np.arange(len(kernel)) - np.arange(len(kernel))[:, None]
-    return np.where(later >= 0, kernel[np.maximum(later, 0)], 0.0)
 
 
 def _direct(
@@ -172,20 +176,6 @@ def _direct(
         kernels += np.imag(amplitudes) @ impulse_response(times, frequencies, dampings, True) / rate
     answered: FloatArray = oaconvolve(force, kernels, axes=1)[:, : force.shape[1]]
     return answered
-
-
-def _check(
-    frequencies: FloatArray, dampings: FloatArray, amplitudes: AnyArray, force: FloatArray, rate: float
-) -> None:
-    check_rate(rate)
-    if force.ndim != 2 or len(amplitudes) != len(force):
-        raise WrongUse(
-            f"amplitudes {amplitudes.shape} and force {force.shape} do not belong together; they are "
-            "(k, m) and (k, t)"
-        )
-    if not np.isfinite(force).all():
-        raise WrongUse("a force is not a finite number; nothing rings")
-    check_modes(frequencies, dampings, amplitudes)
 
 
 def check_modes(frequencies: FloatArray, dampings: FloatArray, amplitudes: AnyArray) -> None:

@@ -172,28 +172,6 @@ def _product(builder: Any, left: Any, right: Any) -> Any:
     return builder.fmul(left, right, flags=_MAY_FUSE)
 
 
-def _turned(builder: Any, power: tuple[Any, Any], step: tuple[Any, Any]) -> tuple[Any, Any]:
-    """Real and imaginary part of the product of two complex numbers."""
-    lost = _product(builder, power[1], step[1])
-    gained = _product(builder, power[1], step[0])
-    real = builder.fsub(_product(builder, power[0], step[0]), lost, flags=_MAY_FUSE)
-    return real, builder.fadd(_product(builder, power[0], step[1]), gained, flags=_MAY_FUSE)
-
-
-def _audible(builder: Any, numbers: Any, least: Any) -> Any:
-    """Zero instead of what has a square not above ``least``."""
-    loud = builder.fcmp_ordered(">", builder.fmul(numbers, numbers), least)
-    return builder.select(loud, numbers, ir.Constant(_VECTOR, [0.0] * TILE))
-
-
-def _spread(builder: Any, number: Any) -> Any:
-    """One number, sixteen times."""
-    first = ir.Constant(ir.IntType(32), 0)
-    alone = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), number, first)
-    lanes = ir.Constant(ir.VectorType(ir.IntType(32), TILE), [0] * TILE)
-    return builder.shuffle_vector(alone, alone, lanes)
-
-
 def _turning(element: Any) -> Callable[..., Any]:
     """Code that writes rows of powers as numbers of one type.
 
@@ -211,7 +189,11 @@ def _turning(element: Any) -> Callable[..., Any]:
         def generate(context: Any, builder: Any, _signature: Any, given: Any) -> Any:
             *outs, apart, rows, first_re, first_im, step_re, step_im, square = given
             step = (_loaded(builder, step_re), _loaded(builder, step_im))
-            least = _spread(builder, square)
+            # One number, sixteen times.
+            first = ir.Constant(ir.IntType(32), 0)
+            alone = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), square, first)
+            lanes = ir.Constant(ir.VectorType(ir.IntType(32), TILE), [0] * TILE)
+            least = builder.shuffle_vector(alone, alone, lanes)
             power = [_variable(builder, _VECTOR) for _ in outs]
             for part, place in zip(power, (first_re, first_im), strict=True):
                 builder.store(_loaded(builder, place), part)
@@ -219,11 +201,17 @@ def _turning(element: Any) -> Callable[..., Any]:
                 on = builder.mul(apart, loop.index)
                 now = (builder.load(power[0]), builder.load(power[1]))
                 for part, out in zip(now, outs, strict=True):
-                    kept = _audible(builder, part, least)
+                    loud = builder.fcmp_ordered(">", builder.fmul(part, part), least)
+                    kept = builder.select(loud, part, ir.Constant(_VECTOR, [0.0] * TILE))
                     written = builder.fptrunc(kept, row) if narrow else kept
                     to = builder.inttoptr(builder.add(out, on), row.as_pointer())
                     builder.store(written, to, align=4 if narrow else _BYTES)
-                for part, value in zip(power, _turned(builder, now, step), strict=True):
+                # Real and imaginary part of the product of two complex numbers.
+                lost = _product(builder, now[1], step[1])
+                gained = _product(builder, now[1], step[0])
+                real = builder.fsub(_product(builder, now[0], step[0]), lost, flags=_MAY_FUSE)
+                imag = builder.fadd(_product(builder, now[0], step[1]), gained, flags=_MAY_FUSE)
+                for part, value in zip(power, (real, imag), strict=True):
                     builder.store(value, part)
             return context.get_dummy_value()
 

@@ -76,7 +76,14 @@ def add_modes(
     for begin in range(0, len(sound), rows * stretch):
         bins[:] = 0.0
         _spread(bins, sizes, step, length * turns, fades, _WIDTH)
-        np.fft.irfft(_folded(bins), length, axis=1, norm="forward", out=waves)
+        # The bins of real transforms of even length: what lies below the first or above the last, mirrored.
+        last = bins.shape[1] - 2 * REACH - 1
+        kept = bins[:, REACH : REACH + last + 1]
+        kept[:, 1 : REACH + 1] += np.conj(bins[:, REACH - 1 :: -1])
+        kept[:, last - REACH : last] += np.conj(bins[:, : REACH + last : -1])
+        # The first and the last are their own mirror images.
+        kept[:, [0, last]] *= 2.0
+        np.fft.irfft(kept, length, axis=1, norm="forward", out=waves)
         for row, first in zip(waves, range(begin, len(sound), stretch), strict=False):
             _add_wave(row, _inverse_bell(stretch, length), sound[first : first + stretch])
     return float(np.abs(weights) @ missing(dampings * (stretch / rate), stretch, length))
@@ -121,17 +128,6 @@ def _inverse_bell(stretch: int, length: int) -> FloatArray:
     """``(stretch,)``: by what a transform is multiplied, sample after sample of its stretch."""
     place = (np.arange(stretch) - stretch // 2) / length
     return read_only(np.exp(4.0 * np.pi**2 * _WIDTH * place**2))
-
-
-def _folded(bins: AnyArray) -> AnyArray:
-    """The bins of real transforms of even length: what lies below the first or above the last, mirrored."""
-    last = bins.shape[1] - 2 * REACH - 1
-    kept = bins[:, REACH : REACH + last + 1]
-    kept[:, 1 : REACH + 1] += np.conj(bins[:, REACH - 1 :: -1])
-    kept[:, last - REACH : last] += np.conj(bins[:, : REACH + last : -1])
-    # The first and the last are their own mirror images.
-    kept[:, [0, last]] *= 2.0
-    return np.asarray(kept)
 
 
 @compiled

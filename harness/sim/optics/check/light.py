@@ -227,25 +227,6 @@ def _fit(target: FloatArray, terms: FloatArray, residual: FloatArray, close: flo
     return found
 
 
-def matching_variant(picture: FloatArray, reference: FloatArray, close: float) -> tuple[str, LightMatch]:
-    """Find the channel order and orientation of the reference that explain a picture best, and its light.
-
-    Args:
-        picture: ``(rows, columns, 3)`` grey levels, means over blocks.
-        reference: the same, of the gel at rest.
-        close: grey levels, length over the channels, within which a block is explained.
-
-    Returns:
-        The variant in words and its light; an empty text for the reference as it is.
-    """
-    matches = [
-        (in_words(exchanged, words), match_light(picture[::2, ::2], turned[::2, ::2, channels], close))
-        for exchanged, channels in channel_orders()
-        for words, turned in turns(reference).items()
-    ]
-    return max(matches, key=lambda found: found[1].explained if (found[1].slope[0] > 0.2).all() else 0.0)
-
-
 def turns(picture: FloatArray, back: bool = False) -> dict[str, FloatArray]:
     """Return a picture ``(rows, columns, 3)`` in every orientation by its words; empty for itself, first.
 
@@ -311,7 +292,11 @@ def better_turned(
     """
     own, coarse = _COARSER * block, block_means(rest, _COARSER)
     picture = block_means(seen, _COARSER)
-    size, left = _size(picture - coarse), surface_residual(without_drift(picture - coarse), calibration, own)
+    change = picture - coarse
+    count = change.size / 3
+    mean = np.einsum("ijc->c", change) / count
+    size = float(np.sqrt(max(np.einsum("ijc,ijc->", change, change) / count - mean @ mean, 0.0)))
+    left = surface_residual(without_drift(change), calibration, own)
     if left < min(_LITTLE, _LITTLE_SHARE * size):
         return None
     ways = {
@@ -343,13 +328,6 @@ def _nearer(picture: FloatArray, rest: FloatArray, limit: float) -> list[tuple[s
         for t, (words, one) in enumerate(every.items())
         if near[t, k] and (exchanged or words)
     ]
-
-
-def _size(change: FloatArray) -> float:
-    """Grey levels rms of a change, but for what all of it has in common."""
-    count = change.size / 3
-    mean = np.einsum("ijc->c", change) / count
-    return float(np.sqrt(max(np.einsum("ijc,ijc->", change, change) / count - mean @ mean, 0.0)))
 
 
 def slope_fit(change: FloatArray, calibration: TactileCalibration, block: int) -> SlopeFit | None:
@@ -426,9 +404,14 @@ def linear_shading(calibration: TactileCalibration, block: int) -> tuple[FloatAr
         ``(rows, columns, 2, 3)`` colours of a normal by block, and the normal of a colour.
     """
     rows, columns = calibration.rows, calibration.columns
+    limit = _SHARE * calibration.header.slope_limit
+    axis = np.linspace(-limit, limit, 15)
+    normal = np.stack([one.ravel() for one in np.meshgrid(axis, axis)], axis=1)
+    normal = normal[np.hypot(normal[:, 0], normal[:, 1]) <= limit]
+    terms = design(normal, np.zeros_like(normal))[:, ::POSITION_TERMS]
     by_place = np.einsum(
         "an,npc->apc",
-        _linear_terms(_SHARE * calibration.header.slope_limit),
+        np.asarray(np.linalg.lstsq(normal, terms, rcond=None)[0]),
         calibration.smooth.reshape(-1, POSITION_TERMS, 3),
     )
     y, x = np.mgrid[: rows // block, : columns // block] * float(block) + 0.5 * (block - 1)
@@ -436,12 +419,3 @@ def linear_shading(calibration: TactileCalibration, block: int) -> tuple[FloatAr
     shading = np.einsum("np,apc->nac", places, by_place).reshape(*x.shape, 2, 3)
     gram = np.einsum("ijac,ijbc->ijab", shading, shading) + _RIDGE * np.eye(2)
     return read_only(shading), read_only(np.linalg.solve(gram, shading))
-
-
-def _linear_terms(limit: float) -> FloatArray:
-    """``(2, 20)``: least squares of the smooth model's terms by the normal alone, over a disc."""
-    axis = np.linspace(-limit, limit, 15)
-    normal = np.stack([one.ravel() for one in np.meshgrid(axis, axis)], axis=1)
-    normal = normal[np.hypot(normal[:, 0], normal[:, 1]) <= limit]
-    terms = design(normal, np.zeros_like(normal))[:, ::POSITION_TERMS]
-    return np.asarray(np.linalg.lstsq(normal, terms, rcond=None)[0])

@@ -16,13 +16,14 @@ from harness.basics.arrays import BoolArray, ByteArray, FloatArray, block_means,
 from harness.basics.errors import DataRefused, PictureRefused
 from harness.sim.optics.check.light import (
     LightMatch,
-    SlopeFit,
     better_turned,
+    channel_orders,
+    in_words,
     linear_shading,
     match_light,
-    matching_variant,
     slope_fit,
     surface_residual,
+    turns,
     without_drift,
 )
 from harness.sim.optics.poisson import free_heights
@@ -291,7 +292,15 @@ def _light_of_rest(rest: FloatArray, known: FloatArray) -> LightMatch:
         light = match_light(rest, known, _CLOSE_AT_REST)
     if light.explained >= _MIN_EXPLAINED_AT_REST:
         return light
-    words, other = matching_variant(rest, known, _CLOSE_AT_REST)
+    # Find the channel order and orientation of the reference that explain a picture best, and its light.
+    matches = [
+        (in_words(exchanged, words), match_light(rest[::2, ::2], turned[::2, ::2, channels], _CLOSE_AT_REST))
+        for exchanged, channels in channel_orders()
+        for words, turned in turns(known).items()
+    ]
+    words, other = max(
+        matches, key=lambda found: found[1].explained if (found[1].slope[0] > 0.2).all() else 0.0
+    )
     if words and other.explained > light.explained + _VARIANT_BETTER:
         raise PictureRefused(
             f"the resting picture fits the calibration's only with {words}: give pictures in the camera's "
@@ -337,7 +346,9 @@ def _settled_light(
     light, agrees = _light_of_press(seen, rest)
     if not len(calibration.smooth):
         return light, agrees, 0.0, ""
-    stands_out = _stands_out(seen - np.clip(light.apply(rest), 0.0, 255.0))
+    touched = np.linalg.norm(seen - np.clip(light.apply(rest), 0.0, 255.0), axis=2) > _SURROUNDINGS
+    edge = np.concatenate([touched[0], touched[-1], touched[:, 0], touched[:, -1]])
+    stands_out = bool(touched.mean() > max(_LEAST_TOUCHED, edge.mean()))
     change = light.apply(rest) - rest if agrees else seen - rest
     size, relief = _tilt_like_change(change, rest, calibration, block)
     doubtful = size > 0.0 if agrees else not stands_out and (size > 0.0 or has_own_rest)
@@ -356,13 +367,6 @@ def _settled_light(
         "take a resting picture just before the press, and leave some of the gel free"
     )
     return light, agrees, doubt, refusal
-
-
-def _stands_out(change: FloatArray) -> bool:
-    """Return whether a contact stands out from its surroundings, inside the picture more than at its edge."""
-    touched = np.linalg.norm(change, axis=2) > _SURROUNDINGS
-    edge = np.concatenate([touched[0], touched[-1], touched[:, 0], touched[:, -1]])
-    return bool(touched.mean() > max(_LEAST_TOUCHED, edge.mean()))
 
 
 def _tilt_like_change(
@@ -466,7 +470,11 @@ def _require_press(change: FloatArray, calibration: TactileCalibration, block: i
     fit = slope_fit(change, calibration, block)
     if fit is None:
         return
-    _require_pressed(fit)
+    if fit.raised < _PULLED:
+        raise PictureRefused(
+            "by its colours the gel was pulled out, not pressed in: press and resting picture are exchanged, "
+            f"or both are upside down; {_TAKE}"
+        )
     little = fit.explained < _LEAST_EXPLAINED or fit.surface < _LEAST_SURFACE
     if not little or surface_residual(change, calibration, block) < _FOREIGN:
         return
@@ -479,14 +487,6 @@ def _require_press(change: FloatArray, calibration: TactileCalibration, block: i
         f"{fit.surface:.0%} of the press's slopes are the slopes of one surface (at least "
         f"{_LEAST_SURFACE:.0%}): it is of another sensor; {_TAKE}"
     )
-
-
-def _require_pressed(fit: SlopeFit) -> None:
-    if fit.raised < _PULLED:
-        raise PictureRefused(
-            "by its colours the gel was pulled out, not pressed in: press and resting picture are exchanged, "
-            f"or both are upside down; {_TAKE}"
-        )
 
 
 def require_light(seen: FloatArray, known: FloatArray) -> None:

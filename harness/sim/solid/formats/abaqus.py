@@ -222,7 +222,14 @@ class _Reader:
         require_few(len(self._scope.numbers), "nodes", self._name)
 
     def _read_elements(self, keyword: _Keyword) -> None:
-        kind = _cell_kind(keyword.options.get("TYPE", "").upper())
+        # Name the kind of cell of an element type; None for springs, masses, beams and others without one.
+        element = keyword.options.get("TYPE", "").upper()
+        solid = _SOLID.match(element)
+        if solid:
+            kind = _SOLID_KINDS.get(int(solid[1]))
+        else:
+            shell = _SHELL.match(element)
+            kind = _SHELL_KINDS.get(int(shell[1])) if shell else None
         if "INPUT" in keyword.options:
             self._refuse(keyword, f"*ELEMENT, INPUT={keyword.options['INPUT']} is not read; write them here")
         if kind is None:
@@ -321,15 +328,6 @@ def _numbered_lines(path: Path) -> Iterator[tuple[int, bytes]]:
         if not text.startswith(b"**"):
             yield number, text
         start = end + 1
-
-
-def _cell_kind(element: str) -> str | None:
-    """Name the kind of cell of an element type; None for springs, masses, beams and others without one."""
-    solid = _SOLID.match(element)
-    if solid:
-        return _SOLID_KINDS.get(int(solid[1]))
-    shell = _SHELL.match(element)
-    return _SHELL_KINDS.get(int(shell[1])) if shell else None
 
 
 def _placement(rows: list[list[float]]) -> tuple[FloatArray, FloatArray]:

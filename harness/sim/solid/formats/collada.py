@@ -49,14 +49,7 @@ def read_collada(path: Path, colours: bool = False) -> MeshFile:
             which the object would be another.
     """
     data = read_bounded(path, "a COLLADA file", MOST_JSON, MeshRefused)
-    _check_elements(data, path.name)
-    # No document type is left that could declare entities.
-    root = ET.fromstring(data)  # noqa: S314
-    return _Reader(path, root, colours).read()
-
-
-def _check_elements(data: bytes, name: str) -> None:
-    """Refuse a document type and more elements than are read, before a tree is built."""
+    # Refuse a document type and more elements than are read, before a tree is built.
     count = 0
 
     def start(*_: Any) -> None:
@@ -64,10 +57,13 @@ def _check_elements(data: bytes, name: str) -> None:
         count += 1
         if count > _MAX_ELEMENTS:
             raise MeshRefused(
-                f"{name} holds more than {_MAX_ELEMENTS:,} XML elements, the most that are read"
+                f"{path.name} holds more than {_MAX_ELEMENTS:,} XML elements, the most that are read"
             )
 
-    parse_xml(BytesIO(data), start, lambda _: None, name)
+    parse_xml(BytesIO(data), start, lambda _: None, path.name)
+    # No document type is left that could declare entities.
+    root = ET.fromstring(data)  # noqa: S314
+    return _Reader(path, root, colours).read()
 
 
 @dataclass(frozen=True, eq=False)
@@ -403,7 +399,14 @@ class _Reader:
         """A piece with the material that its instance binds; vertex colours multiply a texture."""
         if not self.colours:
             return piece.part
-        found = next((each for each in instance.iter() if _is_binding(each, piece.symbol)), None)
+        found = next(
+            (
+                each
+                for each in instance.iter()
+                if _name(each) == "instance_material" and each.get("symbol") == piece.symbol
+            ),
+            None,
+        )
         if found is None:
             return piece.part
         material = self._material(found)
@@ -476,10 +479,6 @@ def _child(element: Any, name: str) -> Any:
 
 def _children(element: Any, name: str) -> list[Any]:
     return [each for each in element if _name(each) == name]
-
-
-def _is_binding(element: Any, symbol: str) -> bool:
-    return _name(element) == "instance_material" and element.get("symbol") == symbol
 
 
 def _set_of(binding: Any, coordinates: str, there: dict[int, FloatArray]) -> int:

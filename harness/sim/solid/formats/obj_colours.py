@@ -184,32 +184,28 @@ def _materials(path: Path, libraries: list[str], notes: list[str]) -> dict[str, 
             if library is None:
                 notes.append(f"the material library {name!r} is not there: its colours are not used")
                 continue
-            _read_library(library, path, found, notes)
+            now = _Material()
+            for key, rest in _logical_lines(
+                read_text_bytes(library, "a material library", MOST_JSON, MeshRefused)
+            ):
+                if key == "newmtl":
+                    now = found.setdefault(rest, _Material())
+                elif key == "kd" and not rest.startswith(("spectral", "xyz")):
+                    try:
+                        values = np.array([float(word) for word in rest.split()[:3]])
+                    except ValueError as error:
+                        raise _refuse(library, f"a colour is {rest!r:.60}") from error
+                    if len(values) not in (1, 3) or not np.all((values >= 0.0) & (values <= 1.0)):
+                        raise _refuse(
+                            library, f"a colour is {rest!r:.60}; three numbers of 0 to 1 are needed"
+                        )
+                    # Programs that write these files write what their user picked on a screen, of 8 bits.
+                    now.tint = linear_from_srgb(np.rint(np.resize(values, 3) * PEAK) / PEAK)
+                elif key == "map_kd":
+                    _set_texture(now, rest, library, path, notes)
+                elif key == "map_d" or (key == "d" and _is_number(rest) and float(rest) < 1.0):
+                    notes.append(f"{library.name} states transparency ({key}): rendered opaque")
     return found
-
-
-def _read_library(library: Path, of: Path, found: dict[str, _Material], notes: list[str]) -> None:
-    now = _Material()
-    for key, rest in _logical_lines(read_text_bytes(library, "a material library", MOST_JSON, MeshRefused)):
-        if key == "newmtl":
-            now = found.setdefault(rest, _Material())
-        elif key == "kd" and not rest.startswith(("spectral", "xyz")):
-            now.tint = _colour(library, rest)
-        elif key == "map_kd":
-            _set_texture(now, rest, library, of, notes)
-        elif key == "map_d" or (key == "d" and _is_number(rest) and float(rest) < 1.0):
-            notes.append(f"{library.name} states transparency ({key}): rendered opaque")
-
-
-def _colour(library: Path, text: str) -> FloatArray:
-    try:
-        values = np.array([float(word) for word in text.split()[:3]])
-    except ValueError as error:
-        raise _refuse(library, f"a colour is {text!r:.60}") from error
-    if len(values) not in (1, 3) or not np.all((values >= 0.0) & (values <= 1.0)):
-        raise _refuse(library, f"a colour is {text!r:.60}; three numbers of 0 to 1 are needed")
-    # Programs that write these files write what their user picked on a screen, of 8 bits.
-    return linear_from_srgb(np.rint(np.resize(values, 3) * PEAK) / PEAK)
 
 
 def _set_texture(now: _Material, text: str, library: Path, of: Path, notes: list[str]) -> None:
