@@ -179,11 +179,11 @@ def _compacted(
 def _oriented(nodes: FloatArray, cells: IntArray) -> tuple[QuadraticMesh, tuple[str, ...], float]:
     """Cells turned the right way and checked, and what was done."""
     said: list[str] = []
-    fullnesses = fullness(nodes, cells[:, :4])
-    if fullnesses.min() < FLATTEST:
+    full = fullness(nodes, cells[:, :4])
+    if full.min() < FLATTEST:
         raise MeshRefused(
-            f"{named(fullnesses < FLATTEST)} of {len(cells)} are flat (the worst quality is "
-            f"{REGULAR * fullnesses.min():.1e}, the least allowed {REGULAR * FLATTEST:.1e}, a regular one's 1): "
+            f"{named(full < FLATTEST)} of {len(cells)} are flat (the worst quality is "
+            f"{REGULAR * full.min():.1e}, the least allowed {REGULAR * FLATTEST:.1e}, a regular one's 1): "
             "the stiffness would lose its digits; collapse them, or mesh the object again"
         )
     if cells.shape[1] == 10:
