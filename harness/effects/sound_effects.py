@@ -22,10 +22,9 @@ from harness.sim.modal.modal import (
 )
 from harness.sim.modal.modes import dampings
 from harness.sim.solid.walls import walled
-from harness.sim.sound.microphone_response import as_heard
 from harness.sim.sound.modal_radiation import radiation
 from harness.sim.sound.modal_sound import ring
-from harness.sim.sound.room import reverberated
+from harness.sim.sound.room import as_heard, reverberated
 
 if TYPE_CHECKING:
     from harness.objectfile.audio.audio import AudioLevel

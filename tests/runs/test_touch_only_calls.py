@@ -21,7 +21,7 @@ from tests.support.whole_run import in_process_run, touch_scene
 
 OF_SOUND = (
     "harness.bench.acquisition",
-    "harness.sim.sound.microphone_response",
+    "harness.sim.sound.room",
     "harness.sim.modal.modal",
     "harness.sim.modal.lanczos",
     "harness.sim.solid.modal_mesh",

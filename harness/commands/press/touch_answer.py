@@ -94,7 +94,7 @@ class Touched:
 def as_json(touched: Touched, out: Path, picture: Path | None, height_out: Path | None) -> dict[str, Any]:
     """The one JSON object."""
     from harness.effects.explain import as_json as plan_json
-    from harness.sim.optics.colour_coverage import colour_error, filled_share
+    from harness.sim.optics.optics import colour_error, filled_share
 
     press, place = touched.press, touched.place
     sensor, calibration = press.gel.sensor, press.gel.calibration

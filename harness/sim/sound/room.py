@@ -1,15 +1,46 @@
-"""A room around the bench: the direct sound, and a diffuse tail that dies away."""
+"""The way of a sound to its recording: a room with a diffuse tail, and a measurement microphone."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import oaconvolve
 
-from harness.basics.arrays import FloatArray
+from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import WrongUse
 
 _DECAY = 3.0 * np.log(10.0)
 """Of the amplitude's logarithm over one reverberation time: 60 dB."""
+
+
+@dataclass(frozen=True)
+class MicrophoneResponse:
+    """A half-inch free-field capsule as IEC 61094-4 describes one: flat between its two ends.
+
+    Attributes:
+        vent: Hz, where the static-pressure vent has taken 3 dB.
+        resonance: Hz, of the diaphragm.
+        quality: of that resonance; 0.7 is the flattest.
+        distance: m from the object's middle.
+    """
+
+    vent: float = 3.0
+    resonance: float = 28e3
+    quality: float = 0.7
+    distance: float = 0.3
+
+    def __post_init__(self) -> None:
+        numbers = (self.vent, self.resonance, self.quality, self.distance)
+        if not all(np.isfinite(number) and number > 0.0 for number in numbers):
+            raise WrongUse(
+                f"a microphone with a vent of {self.vent:g} Hz, a resonance of {self.resonance:g} Hz, "
+                f"quality {self.quality:g} at {self.distance:g} m is none; all are above 0"
+            )
+
+    def at(self, frequencies: FloatArray) -> AnyArray:
+        """``(f,)`` complex: pascals shown per pascal, at frequencies in Hz."""
+        vented = 1j * frequencies / self.vent
+        ratio = frequencies / self.resonance
+        return vented / (1.0 + vented) / (1.0 - ratio**2 + 1j * ratio / self.quality)
 
 
 @dataclass(frozen=True)
@@ -73,3 +104,15 @@ def reverberated(pressure: FloatArray, response: FloatArray) -> FloatArray:
     """``(k, t)`` Pa in the room, of ``(k, t)`` Pa in the open; what sounds on after the end is cut."""
     heard: FloatArray = oaconvolve(pressure, response[None], axes=1)[:, : pressure.shape[1]]
     return heard
+
+
+def as_heard(pressure: FloatArray, rate: float, microphone: MicrophoneResponse) -> FloatArray:
+    """``(k, t)`` Pa that the microphone shows of ``(k, t)`` Pa, which begin in silence."""
+    samples = pressure.shape[1]
+    if samples == 0:
+        return pressure.copy()
+    padded = 2 * samples
+    spectrum = np.fft.rfft(pressure, padded, axis=1)
+    frequencies = np.asarray(np.fft.rfftfreq(padded, 1.0 / rate), dtype=np.float64)
+    heard: FloatArray = np.fft.irfft(spectrum * microphone.at(frequencies), padded, axis=1)
+    return heard[:, :samples]

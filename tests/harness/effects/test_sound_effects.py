@@ -20,9 +20,8 @@ from harness.effects.explain import as_json, scene_plan
 from harness.effects.plan import default_accuracy, plan
 from harness.objects.solid import from_manifold
 from harness.sim.modal.modal import from_arrays
-from harness.sim.sound.microphone_response import MicrophoneResponse
 from harness.sim.sound.modal_sound import Strikes
-from harness.sim.sound.room import RoomField
+from harness.sim.sound.room import MicrophoneResponse, RoomField
 from tests.samples.blows import half_sine
 
 SILENT = scene_from_options("builtin:mug")

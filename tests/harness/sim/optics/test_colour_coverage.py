@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from harness.basics.arrays import FloatArray
-from harness.sim.optics.colour_coverage import colour_error, filled_share
 from harness.sim.optics.lit_calibration import LitCalibration
+from harness.sim.optics.optics import colour_error, filled_share
 from harness.sim.optics.tactile_calibration import shipped_calibration
 
 WORLD = shipped_calibration("gelsight_r15_world")
