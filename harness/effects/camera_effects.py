@@ -4,8 +4,9 @@ Sources: ``object.appearance`` (``Appearance``), ``camera`` (``Pinhole``) and ``
 ``DirectionalLight``), all in the object's frame. Another light computes no ray of the camera anew, and
 without the shadow no ray towards a light is followed.
 
-A picture by the networks of an ObjectFile is a level of ``camera.image`` next to rays on the mesh. Its sources
-are those of the camera and ``object.file`` (the object's ``ObjectFile``), ``object.mesh`` and ``object.wall``.
+A picture by the networks of an ObjectFile is a level of ``camera.image`` next to rays on the mesh. Its
+sources are those of the camera and ``object.file`` (the object's ``ObjectFile``), ``object.mesh`` and
+``object.wall``.
 """
 
 from collections.abc import Mapping
