@@ -40,17 +40,12 @@ PROGRAM = "touchstone"
 
 @dataclass(frozen=True)
 class Command:
-    """Where a command lives, and what it is for.
+    """Where a command lives, and what it is for."""
 
-    Attributes:
-        target: module and name of its function.
-        summary: beside its name in help.
-        removed: options that it had, each with what to do instead.
-    """
-
-    target: str
-    summary: str
+    target: str  #: module and name of its function.
+    summary: str  #: beside its name in help.
     removed: Mapping[str, str] = field(default_factory=dict)
+    """options that it had, each with what to do instead."""
 
 
 ONE_SAMPLE = "there is one way to a picture, one sample a ray where it meets the surface"

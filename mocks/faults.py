@@ -37,17 +37,11 @@ _KEYS = ("instrument", "kind", "seconds")
 
 @dataclass(frozen=True)
 class Fault:
-    """One cue.
+    """One cue."""
 
-    Attributes:
-        instrument: ``"gel"``, ``"camera"``, ``"arm"``, ``"hammer"`` or ``"microphone"``.
-        kind: of the instrument's ``KINDS``.
-        seconds: how long; None until it is cleared.
-    """
-
-    instrument: str
-    kind: str
-    seconds: float | None = None
+    instrument: str  #: ``"gel"``, ``"camera"``, ``"arm"``, ``"hammer"`` or ``"microphone"``.
+    kind: str  #: of the instrument's ``KINDS``.
+    seconds: float | None = None  #: how long; None until it is cleared.
 
 
 def parse(cue: Mapping[str, object]) -> Fault:

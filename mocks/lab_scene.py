@@ -34,17 +34,11 @@ EDGE = 2.2e-3
 
 @dataclass(frozen=True, eq=False)
 class LabScene:
-    """What a lab is told.
+    """What a lab is told."""
 
-    Attributes:
-        bench: nominal.
-        scene: what is on the table.
-        station: whose instruments are mocked.
-    """
-
-    bench: NominalBench
-    scene: SceneFile
-    station: Station
+    bench: NominalBench  #: nominal.
+    scene: SceneFile  #: what is on the table.
+    station: Station  #: whose instruments are mocked.
 
 
 _KEYS = {"schema", "scene", "station", "mesh", "base_from_object"}

@@ -22,34 +22,21 @@ _ATTEMPTS = 10_000
 
 @dataclass(frozen=True)
 class StepMark:
-    """The step and sample that the run is at.
+    """The step and sample that the run is at."""
 
-    Attributes:
-        number: counts marks, so that a repeated step is told from the last one.
-        step: of the run.
-        sample: of the step; -1 before the first.
-    """
-
-    number: int
-    step: int
-    sample: int
+    number: int  #: counts marks, so that a repeated step is told from the last one.
+    step: int  #: of the run.
+    sample: int  #: of the step; -1 before the first.
 
 
 @dataclass(frozen=True, eq=False)
 class Firing:
-    """The last time that the striker's output was switched on.
+    """The last time that the striker's output was switched on."""
 
-    Attributes:
-        number: counts firings; zero before the first.
-        base_from_flange: ``(4, 4)``, where the flange was.
-        step: of the run.
-        sample: of the step.
-    """
-
-    number: int
-    base_from_flange: FloatArray
-    step: int
-    sample: int
+    number: int  #: counts firings; zero before the first.
+    base_from_flange: FloatArray  #: ``(4, 4)``, where the flange was.
+    step: int  #: of the run.
+    sample: int  #: of the step.
 
 
 class _Cell:

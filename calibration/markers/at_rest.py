@@ -53,44 +53,27 @@ _TURNS = 8
 
 @dataclass(frozen=True)
 class Printed:
-    """What is known of the gel beside its pictures; at most one of pitch and spacing.
+    """What is known of the gel beside its pictures; at most one of pitch and spacing."""
 
-    Attributes:
-        sensor: make.
-        serial: of the gel.
-        pitch: m a pixel.
-        spacing: m from dot to dot of the print: millimetres a pixel follow.
-    """
-
-    sensor: str = "tactile camera"
-    serial: str = "unknown"
-    pitch: float | None = None
-    spacing: float | None = None
+    sensor: str = "tactile camera"  #: make.
+    serial: str = "unknown"  #: of the gel.
+    pitch: float | None = None  #: m a pixel.
+    spacing: float | None = None  #: m from dot to dot of the print: millimetres a pixel follow.
 
 
 @dataclass(frozen=True, eq=False)
 class RestingMarkers:
-    """The dots of a gel at rest.
+    """The dots of a gel at rest."""
 
-    Attributes:
-        picture: ``(rows, columns, 3)`` mean of the pictures.
-        dots: of that mean.
-        lattice: through them.
-        scale: how the picture lies on the gel, by the print's spacing; None where that is not known.
-        pitch: m a pixel; None where nothing told it.
-        wander: pixels rms, of a dot from picture to picture; None of one picture.
-        misprinted: places in ``dots`` that lie off their grid by more than ``LARGEST_LOCAL``.
-        seconds: that it took.
-    """
-
-    picture: ByteArray
-    dots: Dots
-    lattice: DotLattice
+    picture: ByteArray  #: ``(rows, columns, 3)`` mean of the pictures.
+    dots: Dots  #: of that mean.
+    lattice: DotLattice  #: through them.
     scale: ArmScale | None
-    pitch: float | None
-    wander: float | None
-    misprinted: tuple[int, ...]
-    seconds: float
+    """how the picture lies on the gel, by the print's spacing; None where that is not known."""
+    pitch: float | None  #: m a pixel; None where nothing told it.
+    wander: float | None  #: pixels rms, of a dot from picture to picture; None of one picture.
+    misprinted: tuple[int, ...]  #: places in ``dots`` that lie off their grid by more than ``LARGEST_LOCAL``.
+    seconds: float  #: that it took.
 
 
 def markers_at_rest(pictures: Sequence[ByteArray], printed: Printed) -> RestingMarkers:

@@ -43,23 +43,15 @@ _SOFT = 0.03
 
 @dataclass(frozen=True, eq=False)
 class Dots:
-    """Dots of a picture, in no order.
+    """Dots of a picture, in no order."""
 
-    Attributes:
-        places: ``(n, 2)`` pixels (column, row), of their middles.
-        sigma: ``(n,)`` pixels, one standard uncertainty of either coordinate, by what the fit left over.
-        radius: ``(n,)`` pixels.
-        ink: ``(n,)`` share of the gel's light that the dot gives back.
-        cut: how many blobs the border of the picture cuts, which are not used.
-        odd: ``(m, 2)`` pixels, of dark places that are no dots: another size, not round, not dark.
-    """
-
-    places: FloatArray
+    places: FloatArray  #: ``(n, 2)`` pixels (column, row), of their middles.
     sigma: FloatArray
-    radius: FloatArray
-    ink: FloatArray
-    cut: int
-    odd: FloatArray
+    """``(n,)`` pixels, one standard uncertainty of either coordinate, by what the fit left over."""
+    radius: FloatArray  #: ``(n,)`` pixels.
+    ink: FloatArray  #: ``(n,)`` share of the gel's light that the dot gives back.
+    cut: int  #: how many blobs the border of the picture cuts, which are not used.
+    odd: FloatArray  #: ``(m, 2)`` pixels, of dark places that are no dots: another size, not round, not dark.
 
 
 def find_dots(picture: ByteArray) -> Dots:

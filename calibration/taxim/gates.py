@@ -78,42 +78,25 @@ _LEAST_SEEN = 0.25
 
 @dataclass(frozen=True)
 class Found:
-    """A disc of changed colour.
+    """A disc of changed colour."""
 
-    Attributes:
-        centre: pixels (column, row); may lie outside the picture by less than the disc.
-        strength: grey levels rms over the disc; hardly more than the noise where nothing was pressed.
-        share: of the disc's energy that the ramps explain, 0 to 1.
-    """
-
-    centre: tuple[float, float]
-    strength: float
-    share: float
+    centre: tuple[float, float]  #: pixels (column, row); may lie outside the picture by less than the disc.
+    strength: float  #: grey levels rms over the disc; hardly more than the noise where nothing was pressed.
+    share: float  #: of the disc's energy that the ramps explain, 0 to 1.
 
 
 @dataclass(frozen=True, eq=False)
 class Sighting:
-    """A press as the detector sees it.
+    """A press as the detector sees it."""
 
-    Attributes:
-        found: the disc.
-        drift: ``(3,)`` grey levels, of the untouched gel against the background.
-        in_view: share of the contact that lies in the picture.
-        clipped: share with a channel at 0 or 255 among the pixels that changed much.
-        changed: pixels that changed much, as a share of a contact's.
-        exchanged: whether the untouched gel fits the background far better with red and blue exchanged.
-        small: ``(rows, columns, 3)`` the change, averaged over blocks.
-        lost: why part of the picture is none; None where it is whole.
-    """
-
-    found: Found
-    drift: FloatArray
-    in_view: float
-    clipped: float
-    changed: float
-    exchanged: bool
-    small: FloatArray
-    lost: str | None
+    found: Found  #: the disc.
+    drift: FloatArray  #: ``(3,)`` grey levels, of the untouched gel against the background.
+    in_view: float  #: share of the contact that lies in the picture.
+    clipped: float  #: share with a channel at 0 or 255 among the pixels that changed much.
+    changed: float  #: pixels that changed much, as a share of a contact's.
+    exchanged: bool  #: whether the untouched gel fits the background far better with red and blue exchanged.
+    small: FloatArray  #: ``(rows, columns, 3)`` the change, averaged over blocks.
+    lost: str | None  #: why part of the picture is none; None where it is whole.
 
 
 def sightings(pictures: Pictures, ball: float) -> list[Sighting]:

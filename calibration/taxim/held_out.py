@@ -71,60 +71,37 @@ _ALIKE = (0.03, 1.0)
 
 @dataclass(frozen=True)
 class ContactCircle:
-    """Where the presses' contact line lies about the centres that were assumed.
+    """Where the presses' contact line lies about the centres that were assumed."""
 
-    Attributes:
-        shift: ``(2,)`` pixels (column, row) from the assumed centres to the circle's.
-        radius: pixels.
-        scatter: pixels, how far the line strays from the circle (scaled median of the rays).
-    """
-
-    shift: FloatArray
-    radius: float
-    scatter: float
+    shift: FloatArray  #: ``(2,)`` pixels (column, row) from the assumed centres to the circle's.
+    radius: float  #: pixels.
+    scatter: float  #: pixels, how far the line strays from the circle (scaled median of the rays).
 
 
 @dataclass(frozen=True, eq=False)
 class FittedModel:
-    """What is taught by a set of presses.
+    """What is taught by a set of presses."""
 
-    Attributes:
-        plain: slopes alone make the colour, as the smooth model of a calibration has it.
-        fit: a contact's offset besides. With it a shift of all centres together is hardly seen in the
-            colours, so the centres are those of the contact line.
-        circle: the contact line.
-        light: skirt and colours of the smooth level, fitted to the skirt too.
-        table: of ``fit``.
-        support: of the table.
-        rest: ``(rows, columns, 3)`` grey levels, of the untouched gel against the background.
-        bias: ``(2,)`` pixels from where the detector finds a centre to where the fit does.
-    """
-
-    plain: SmoothFit
+    plain: SmoothFit  #: slopes alone make the colour, as the smooth model of a calibration has it.
     fit: SmoothFit
-    circle: ContactCircle
-    light: GelLight
-    table: Float32Array
-    support: BoolArray
-    rest: FloatArray
-    bias: FloatArray
+    """a contact's offset besides. With it a shift of all centres together is hardly seen in the colours, so
+    the centres are those of the contact line."""
+    circle: ContactCircle  #: the contact line.
+    light: GelLight  #: skirt and colours of the smooth level, fitted to the skirt too.
+    table: Float32Array  #: of ``fit``.
+    support: BoolArray  #: of the table.
+    rest: FloatArray  #: ``(rows, columns, 3)`` grey levels, of the untouched gel against the background.
+    bias: FloatArray  #: ``(2,)`` pixels from where the detector finds a centre to where the fit does.
 
 
 @dataclass(frozen=True)
 class Score:
-    """One press predicted by presses it was not among; PSNR in dB over the scored pixels.
+    """One press predicted by presses it was not among; PSNR in dB over the scored pixels."""
 
-    Attributes:
-        table: of the table, only the centre refitted.
-        smooth: of the smooth level with the light of a press, at the same centre.
-        unrefitted: of the table, with the centre where the detector found it.
-        nothing: of no prediction at all, the untouched gel.
-    """
-
-    table: float
-    smooth: float
-    unrefitted: float
-    nothing: float
+    table: float  #: of the table, only the centre refitted.
+    smooth: float  #: of the smooth level with the light of a press, at the same centre.
+    unrefitted: float  #: of the table, with the centre where the detector found it.
+    nothing: float  #: of no prediction at all, the untouched gel.
 
 
 def teach(pack: PressPack, change: FloatArray, ball: float) -> FittedModel:
@@ -153,21 +130,16 @@ def teach(pack: PressPack, change: FloatArray, ball: float) -> FittedModel:
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Presses predicted by the others.
+    """Presses predicted by the others."""
 
-    Attributes:
-        scores: of every press.
-        left: ``(rows, columns)`` what the table left over, summed over the presses, grey levels rms squared.
-        count: ``(rows, columns)`` how many presses each pixel was scored in.
-        centres: ``(presses, 2)`` pixels (column, row), refitted on the press by the other folds' model.
-        folds: of each its model, the presses it was taught by and those left out.
-    """
-
-    scores: list[Score]
+    scores: list[Score]  #: of every press.
     left: FloatArray
-    count: FloatArray
+    """``(rows, columns)`` what the table left over, summed over the presses, grey levels rms squared."""
+    count: FloatArray  #: ``(rows, columns)`` how many presses each pixel was scored in.
     centres: FloatArray
+    """``(presses, 2)`` pixels (column, row), refitted on the press by the other folds' model."""
     folds: list[tuple[FittedModel, IntArray, IntArray]]
+    """of each its model, the presses it was taught by and those left out."""
 
 
 def held_out(pack: PressPack, change: FloatArray, ball: float, radius: float) -> HeldOut:

@@ -42,38 +42,24 @@ _RIDGE, _PLACE_RIDGE = 1e-6, 1e-4
 
 @dataclass(frozen=True, eq=False)
 class RadialProfile:
-    """A ball in the gel, by the distance from its axis; 0, 1, 2, ... pixels.
+    """A ball in the gel, by the distance from its axis; 0, 1, 2, ... pixels."""
 
-    Attributes:
-        sine: of the surface's slope as the camera's pixels have it.
-        height: pixels, of indentation.
-    """
-
-    sine: FloatArray
-    height: FloatArray
+    sine: FloatArray  #: of the surface's slope as the camera's pixels have it.
+    height: FloatArray  #: pixels, of indentation.
 
 
 @dataclass(frozen=True, eq=False)
 class GelLight:
-    """The skirt and the colours of contact and skirt.
+    """The skirt and the colours of contact and skirt."""
 
-    Attributes:
-        skirt: of the gel.
-        lit: ``(156, 3)`` as ``harness.sim.optics.lit_calibration`` keeps it, but per pixel of indentation.
-        depth: pixels that the ball reaches past the untouched gel.
-        profile: of the ball in it.
-        edge: pixels, the contact line.
-        limit: sine of the steepest slope.
-        residual_rms: grey levels, over contact and skirt.
-    """
-
-    skirt: GelSkirt
+    skirt: GelSkirt  #: of the gel.
     lit: FloatArray
-    depth: float
-    profile: RadialProfile
-    edge: float
-    limit: float
-    residual_rms: float
+    """``(156, 3)`` as ``harness.sim.optics.lit_calibration`` keeps it, but per pixel of indentation."""
+    depth: float  #: pixels that the ball reaches past the untouched gel.
+    profile: RadialProfile  #: of the ball in it.
+    edge: float  #: pixels, the contact line.
+    limit: float  #: sine of the steepest slope.
+    residual_rms: float  #: grey levels, over contact and skirt.
 
 
 def fit_light(pack: PressPack, change: FloatArray, centres: FloatArray, edge: float, ball: float) -> GelLight:

@@ -49,23 +49,14 @@ _CLEAR = 0.1
 
 @dataclass(frozen=True)
 class Identity:
-    """What the presses cannot say of themselves.
+    """What the presses cannot say of themselves."""
 
-    Attributes:
-        sensor: make.
-        serial: of the sensor.
-        licence: of the pictures.
-        date: ISO 8601.
-        pitch: metres a pixel.
-        ball_radius: metres.
-    """
-
-    sensor: str
-    serial: str
-    licence: str
-    date: str
-    pitch: float
-    ball_radius: float
+    sensor: str  #: make.
+    serial: str  #: of the sensor.
+    licence: str  #: of the pictures.
+    date: str  #: ISO 8601.
+    pitch: float  #: metres a pixel.
+    ball_radius: float  #: metres.
 
     @property
     def ball(self) -> float:
@@ -75,21 +66,13 @@ class Identity:
 
 @dataclass(frozen=True)
 class UsedPress:
-    """A press of the calibration.
+    """A press of the calibration."""
 
-    Attributes:
-        name: of its picture.
-        centre: pixels (column, row).
-        radius: pixels, of its contact line.
-        depth: metres, of the ball in the gel, by its contact line.
-        score: by the presses of the other folds.
-    """
-
-    name: str
-    centre: tuple[float, float]
-    radius: float
-    depth: float
-    score: Score
+    name: str  #: of its picture.
+    centre: tuple[float, float]  #: pixels (column, row).
+    radius: float  #: pixels, of its contact line.
+    depth: float  #: metres, of the ball in the gel, by its contact line.
+    score: Score  #: by the presses of the other folds.
 
 
 def contact_radius(clean: FloatArray, centre: FloatArray, ball: float) -> float:
@@ -101,38 +84,24 @@ def contact_radius(clean: FloatArray, centre: FloatArray, ball: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class MarkFree:
-    """A calibration, and what it was made of.
+    """A calibration, and what it was made of."""
 
-    Attributes:
-        calibration: the artefact.
-        used: the presses it stands on, in the order of the set.
-        refused: the others.
-        contact_radius: pixels, of the contact line of all presses laid over one another.
-        roundness: pixels that this line strays from a circle.
-        lean: rad by which slopes lean against the contact line where a contact's own dimming has no place
-            in the model, as in the array ``smooth`` that the inverse starts from.
-        depth: metres that the balls reach past the untouched gel, by the contact line and the skirt.
-        left: ``(rows, columns)`` grey levels rms left over on held-out presses, NaN where none was scored.
-        coverage: ``(rows, columns)`` how many contacts reached a pixel.
-        shadow: what the presses show of shadows.
-        shadow_score: of them, on presses held out; None where the presses show none.
-        background_from: in words.
-        seconds: from pictures in memory to the artefact.
-    """
-
-    calibration: LitCalibration
-    used: tuple[UsedPress, ...]
-    refused: tuple[Refused, ...]
-    contact_radius: float
-    roundness: float
+    calibration: LitCalibration  #: the artefact.
+    used: tuple[UsedPress, ...]  #: the presses it stands on, in the order of the set.
+    refused: tuple[Refused, ...]  #: the others.
+    contact_radius: float  #: pixels, of the contact line of all presses laid over one another.
+    roundness: float  #: pixels that this line strays from a circle.
     lean: float
-    depth: float
+    """rad by which slopes lean against the contact line where a contact's own dimming has no place in the
+    model, as in the array ``smooth`` that the inverse starts from."""
+    depth: float  #: metres that the balls reach past the untouched gel, by the contact line and the skirt.
     left: FloatArray
-    coverage: IntArray
-    shadow: ShadowFit
-    shadow_score: ShadowScore | None
-    background_from: str
-    seconds: float
+    """``(rows, columns)`` grey levels rms left over on held-out presses, NaN where none was scored."""
+    coverage: IntArray  #: ``(rows, columns)`` how many contacts reached a pixel.
+    shadow: ShadowFit  #: what the presses show of shadows.
+    shadow_score: ShadowScore | None  #: of them, on presses held out; None where the presses show none.
+    background_from: str  #: in words.
+    seconds: float  #: from pictures in memory to the artefact.
 
     @property
     def shadow_missing(self) -> str:

@@ -49,19 +49,13 @@ def graded(first: FloatArray, second: FloatArray, degree: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class ColourTerms:
-    """The terms of a model at chosen pixels, never written out.
+    """The terms of a model at chosen pixels, never written out."""
 
-    Attributes:
-        powers: of the groups of terms.
-        normals: ``(_, n)`` products of the normal's parts, by ``graded`` to twice the model's degree.
-        places: ``(15, n)`` of the scaled place, to twice its degree; see ``place_products``.
-        height: ``(n,)`` indentation; None where no power has one.
-    """
-
-    powers: tuple[Power, ...]
+    powers: tuple[Power, ...]  #: of the groups of terms.
     normals: FloatArray
-    places: FloatArray
-    height: FloatArray | None = None
+    """``(_, n)`` products of the normal's parts, by ``graded`` to twice the model's degree."""
+    places: FloatArray  #: ``(15, n)`` of the scaled place, to twice its degree; see ``place_products``.
+    height: FloatArray | None = None  #: ``(n,)`` indentation; None where no power has one.
 
     def normal_equations(self, weight: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
         """``terms.T @ diag(weight) @ terms`` and ``terms.T @ diag(weight) @ seen``.
@@ -129,19 +123,14 @@ def _count(degree: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class _Layout:
-    """Where terms and pairs of terms lie among the sums.
-
-    Attributes:
-        rows: by the power of the indentation, how many products of the normal its terms reach.
-        moment_rows: the same of pairs of terms.
-        term: three index arrays ``(t,)``: power of the indentation, product of the normal, of the place.
-        pair: ``(t, t)`` index into the moments, raveled.
-    """
+    """Where terms and pairs of terms lie among the sums."""
 
     rows: tuple[int, ...]
-    moment_rows: tuple[int, ...]
+    """by the power of the indentation, how many products of the normal its terms reach."""
+    moment_rows: tuple[int, ...]  #: the same of pairs of terms.
     term: tuple[IntArray, IntArray, IntArray]
-    pair: IntArray
+    """three index arrays ``(t,)``: power of the indentation, product of the normal, of the place."""
+    pair: IntArray  #: ``(t, t)`` index into the moments, raveled.
 
 
 @lru_cache(maxsize=8)

@@ -27,44 +27,28 @@ _KEYS = {"f0", "imgs", "touch_center", "touch_radius"}
 
 @dataclass(frozen=True)
 class Refused:
-    """A press that is not used.
+    """A press that is not used."""
 
-    Attributes:
-        name: of its picture.
-        kind: of the damage, one word for programs.
-        reason: for people: what was found, the limit, what to do.
-    """
-
-    name: str
-    kind: str
-    reason: str
+    name: str  #: of its picture.
+    kind: str  #: of the damage, one word for programs.
+    reason: str  #: for people: what was found, the limit, what to do.
 
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """One ball pressed into one gel at many places.
+    """One ball pressed into one gel at many places."""
 
-    Attributes:
-        background: ``(rows, columns, 3)`` RGB of the untouched gel.
-        background_from: where that comes from, in words.
-        images: ``(presses, rows, columns, 3)`` RGB.
-        names: of the presses.
-        marks: ``(presses, 3)`` centre (column, row) and radius in pixels that came with a data pack.
-        source: of the pixels, in words.
-        sha256: of background and images, whatever the order of the presses.
-        refused: files that are no press of this set.
-        aspect: a pixel's height over its width in the files, where the pictures were made square by it.
-    """
-
-    background: ByteArray
-    background_from: str
-    images: ByteArray
-    names: tuple[str, ...]
+    background: ByteArray  #: ``(rows, columns, 3)`` RGB of the untouched gel.
+    background_from: str  #: where that comes from, in words.
+    images: ByteArray  #: ``(presses, rows, columns, 3)`` RGB.
+    names: tuple[str, ...]  #: of the presses.
     marks: FloatArray | None
-    source: str
-    sha256: str
-    refused: tuple[Refused, ...] = ()
+    """``(presses, 3)`` centre (column, row) and radius in pixels that came with a data pack."""
+    source: str  #: of the pixels, in words.
+    sha256: str  #: of background and images, whatever the order of the presses.
+    refused: tuple[Refused, ...] = ()  #: files that are no press of this set.
     aspect: float = 1.0
+    """a pixel's height over its width in the files, where the pictures were made square by it."""
 
 
 def squared(pictures: Pictures, aspect: float) -> Pictures:
@@ -215,23 +199,14 @@ def set_digest(rest: ByteArray, images: ByteArray) -> str:
 
 @dataclass(frozen=True, eq=False)
 class PressPack:
-    """Pictures of one ball pressed into one gel at many places.
+    """Pictures of one ball pressed into one gel at many places."""
 
-    Attributes:
-        background: ``(rows, columns, 3)`` RGB, of the untouched gel.
-        images: ``(presses, rows, columns, 3)`` RGB.
-        centres: ``(presses, 2)`` pixels (column, row), marked by hand.
-        radii: ``(presses,)`` pixels, of the marked circles.
-        number: ``(presses,)`` of each press in the file it came from, from 0.
-        sha256: of that file.
-    """
-
-    background: ByteArray
-    images: ByteArray
-    centres: FloatArray
-    radii: FloatArray
-    number: IntArray
-    sha256: str
+    background: ByteArray  #: ``(rows, columns, 3)`` RGB, of the untouched gel.
+    images: ByteArray  #: ``(presses, rows, columns, 3)`` RGB.
+    centres: FloatArray  #: ``(presses, 2)`` pixels (column, row), marked by hand.
+    radii: FloatArray  #: ``(presses,)`` pixels, of the marked circles.
+    number: IntArray  #: ``(presses,)`` of each press in the file it came from, from 0.
+    sha256: str  #: of that file.
 
     @property
     def shape(self) -> tuple[int, int]:

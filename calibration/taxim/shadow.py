@@ -79,53 +79,32 @@ _SHARE = 2.0 / 3.0
 
 @dataclass(frozen=True)
 class ColourShadow:
-    """What presses show of one colour's shadow.
+    """What presses show of one colour's shadow."""
 
-    Attributes:
-        colour: red, green or blue.
-        missing: why it is not drawn; empty where it is.
-        falls: rad, direction in the picture (from columns towards rows) in which the shadow falls; the light
-            comes from the other side. NaN where nothing is darker than explained.
-        falls_error: rad, one standard error, by the presses' scatter.
-        dark_side: rad, where slopes turn the gel away from that light.
-        deepest: grey levels by which the darkest sample is darker than explained.
-        deepest_error: one standard error of it.
-        misfit: grey levels by which the brightest sample is brighter than explained: what is no shadow.
-        reach: pixels from the rim within which half of the shadow's darkness lies.
-        wide: rad, of all directions that are shaded.
-    """
-
-    colour: str
-    missing: str
+    colour: str  #: red, green or blue.
+    missing: str  #: why it is not drawn; empty where it is.
     falls: float
-    falls_error: float
-    dark_side: float
-    deepest: float
-    deepest_error: float
-    misfit: float
-    reach: float
-    wide: float
+    """rad, direction in the picture (from columns towards rows) in which the shadow falls; the light comes
+    from the other side. NaN where nothing is darker than explained."""
+    falls_error: float  #: rad, one standard error, by the presses' scatter.
+    dark_side: float  #: rad, where slopes turn the gel away from that light.
+    deepest: float  #: grey levels by which the darkest sample is darker than explained.
+    deepest_error: float  #: one standard error of it.
+    misfit: float  #: grey levels by which the brightest sample is brighter than explained: what is no shadow.
+    reach: float  #: pixels from the rim within which half of the shadow's darkness lies.
+    wide: float  #: rad, of all directions that are shaded.
 
 
 @dataclass(frozen=True, eq=False)
 class ShadowFit:
-    """The shadows of a set of presses.
+    """The shadows of a set of presses."""
 
-    Attributes:
-        table: with depths in pixels of indentation; None where no colour throws any.
-        colours: red, green, blue.
-        rim: pixels of indentation, of the rim that was seen.
-        directions: ``(d,)`` rad, of the rays.
-        typical: ``(3, d, samples)`` grey levels that presses leave over along them, median.
-        cells: ``(3, d, samples)`` what is taken for a shadow.
-    """
-
-    table: ShadowTable | None
-    colours: tuple[ColourShadow, ...]
-    rim: float
-    directions: FloatArray
-    typical: FloatArray
-    cells: BoolArray
+    table: ShadowTable | None  #: with depths in pixels of indentation; None where no colour throws any.
+    colours: tuple[ColourShadow, ...]  #: red, green, blue.
+    rim: float  #: pixels of indentation, of the rim that was seen.
+    directions: FloatArray  #: ``(d,)`` rad, of the rays.
+    typical: FloatArray  #: ``(3, d, samples)`` grey levels that presses leave over along them, median.
+    cells: BoolArray  #: ``(3, d, samples)`` what is taken for a shadow.
 
     def in_metres(self, pitch: float) -> ShadowTable | None:
         """The table as simulators take it; ``pitch`` in metres a pixel."""
@@ -161,21 +140,15 @@ def fit_shadow(pack: PressPack, clean: FloatArray, centres: FloatArray, light: G
 
 @dataclass(frozen=True, eq=False)
 class Around:
-    """Presses on one polar grid about their contacts.
+    """Presses on one polar grid about their contacts."""
 
-    Attributes:
-        directions: ``(d,)`` rad, in the picture: from the columns' direction towards the rows'.
-        starts: ``(d,)`` pixels from the axis where rays begin: the outermost pixel of the rim.
-        seen: ``(presses, d, samples, 3)`` grey levels against the untouched gel; NaN outside the picture.
-        left: the same less what slopes, skirt and light explain.
-        within: ``(d, 3)`` grey levels that are explained within the contact, where no shadow falls.
-    """
-
-    directions: FloatArray
-    starts: FloatArray
+    directions: FloatArray  #: ``(d,)`` rad, in the picture: from the columns' direction towards the rows'.
+    starts: FloatArray  #: ``(d,)`` pixels from the axis where rays begin: the outermost pixel of the rim.
     seen: FloatArray
-    left: FloatArray
+    """``(presses, d, samples, 3)`` grey levels against the untouched gel; NaN outside the picture."""
+    left: FloatArray  #: the same less what slopes, skirt and light explain.
     within: FloatArray
+    """``(d, 3)`` grey levels that are explained within the contact, where no shadow falls."""
 
 
 def _colour(seen: Around, c: int, enough: BoolArray, known: IntArray) -> tuple[ColourShadow, BoolArray]:
@@ -338,26 +311,16 @@ def rim_reach(edge: float, directions: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class ShadowScore:
-    """Presses predicted by the other folds', over the pixels that the shadow moves by a grey level or more.
+    """Scores of held-out presses, over the pixels that the shadow changes by a grey level or more."""
 
-    Attributes:
-        shaded: dB, median PSNR with the shadow.
-        plain: dB, the same without.
-        gain: dB, median over the presses of the difference.
-        better: share of the presses that are predicted better with it.
-        presses: that were scored.
-        pixels: of a press, median.
-        of: presses there are.
-    """
+    shaded: float  #: dB, median PSNR with the shadow.
+    plain: float  #: dB, the same without.
+    gain: float  #: dB, median over the presses of the difference.
+    better: float  #: share of the presses that are predicted better with it.
+    presses: int  #: that were scored.
+    pixels: float  #: of a press, median.
 
-    shaded: float
-    plain: float
-    gain: float
-    better: float
-    presses: int
-    pixels: float
-
-    of: int
+    of: int  #: presses there are.
 
     @property
     def worth(self) -> bool:

@@ -42,21 +42,16 @@ _LONGEST_STEP = 0.05
 
 @dataclass(frozen=True)
 class Manner:
-    """How a set is fitted; the defaults are of presses whose circles were marked by hand.
+    """How a set is fitted; the defaults are of presses whose circles were marked by hand."""
 
-    Attributes:
-        offset: whether a contact may change the colour whatever its slope.
-        rounds: of coefficients and centres in turns.
-        place_ridge: pulls the colours towards being the same everywhere, in units of the constant terms' own
-            weight. Presses seldom cover the whole gel; where none was made, two halves of the published set
-            differ by 16 grey levels without it and by 6 with 1e-3, for 0.1 dB on presses held out.
-        edge_again: whether the contact line is looked for again with refined centres, which show it sharper.
-    """
-
-    offset: bool = False
-    rounds: int = 6
+    offset: bool = False  #: whether a contact may change the colour whatever its slope.
+    rounds: int = 6  #: of coefficients and centres in turns.
     place_ridge: float = 1e-3
+    """pulls the colours towards being the same everywhere, in units of the constant terms' own weight.
+    Presses seldom cover the whole gel; where none was made, two halves of the published set differ by 16 grey
+    levels without it and by 6 with 1e-3, for 0.1 dB on presses held out."""
     edge_again: bool = False
+    """whether the contact line is looked for again with refined centres, which show it sharper."""
 
 
 WITH_OFFSET = Manner(offset=True, rounds=3, place_ridge=1e-4)
@@ -65,22 +60,15 @@ WITH_OFFSET = Manner(offset=True, rounds=3, place_ridge=1e-4)
 
 @dataclass(frozen=True, eq=False)
 class SmoothFit:
-    """A smooth model and the presses as it sees them.
-
-    Attributes:
-        colours: ``(120, 3)`` coefficients, see ``harness.sim.optics.shading``; ``(126, 3)`` where the last
-            six are a contact's offset by the position.
-        centres: ``(presses, 2)`` pixels (column, row), refined.
-        edge: pixels, the radius out to which the gel follows the ball.
-        condition: of the normalised least-squares problem.
-        residual_rms: grey levels.
-    """
+    """A smooth model and the presses as it sees them."""
 
     colours: FloatArray
-    centres: FloatArray
-    edge: float
-    condition: float
-    residual_rms: float
+    """``(120, 3)`` coefficients, see ``harness.sim.optics.shading``; ``(126, 3)`` where the last six are a
+    contact's offset by the position."""
+    centres: FloatArray  #: ``(presses, 2)`` pixels (column, row), refined.
+    edge: float  #: pixels, the radius out to which the gel follows the ball.
+    condition: float  #: of the normalised least-squares problem.
+    residual_rms: float  #: grey levels.
 
 
 def changes(pack: PressPack) -> FloatArray:

@@ -183,22 +183,15 @@ _PACKET_SECONDS = 2.5e-3
 
 @dataclass(frozen=True)
 class BoxModel:
-    """What the driver must know of a model.
+    """What the driver must know of a model."""
 
-    Attributes:
-        number: as ``info 1`` answers.
-        bits: of the converter; words of fewer than 16 are left-justified.
-        volts: full scale, either sign.
-        divisors: least and greatest that ``srate`` takes.
-        resets: commands that undo what another program may have left on the box: text for binary, and
-            the decimation of a model that has it.
-    """
-
-    number: str
-    bits: int
-    volts: float
-    divisors: tuple[int, int]
+    number: str  #: as ``info 1`` answers.
+    bits: int  #: of the converter; words of fewer than 16 are left-justified.
+    volts: float  #: full scale, either sign.
+    divisors: tuple[int, int]  #: least and greatest that ``srate`` takes.
     resets: tuple[str, ...]
+    """commands that undo what another program may have left on the box: text for binary, and the decimation
+    of a model that has it."""
 
     @property
     def full_scale(self) -> int:

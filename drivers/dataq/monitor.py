@@ -45,15 +45,10 @@ _NO_CRYSTAL = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Rests:
-    """What the channels rest at, as calibrated.
+    """What the channels rest at, as calibrated."""
 
-    Attributes:
-        offsets: ``(channels,)`` counts; the force's first.
-        tolerance: counts.
-    """
-
-    offsets: FloatArray
-    tolerance: float
+    offsets: FloatArray  #: ``(channels,)`` counts; the force's first.
+    tolerance: float  #: counts.
 
     @property
     def distinct(self) -> bool:
@@ -68,19 +63,13 @@ class StreamMonitor:
         nominal_rate: Hz, scans a second.
         model: of the box.
         rests: what its channels rest at.
-
-    Attributes:
-        clock: of the scans, from prompt arrivals.
-        prompt: scans that a prompt arrival has shown to be complete.
-        ordered: scans up to which the channels have been seen in their order.
-        fault: what went wrong, in words; empty while all is well.
     """
 
     def __init__(self, nominal_rate: float, model: BoxModel, rests: Rests) -> None:
-        self.clock = ArrivalClock(nominal_rate)
-        self.prompt = 0
-        self.ordered = 0
-        self.fault = ""
+        self.clock = ArrivalClock(nominal_rate)  #: of the scans, from prompt arrivals.
+        self.prompt = 0  #: scans that a prompt arrival has shown to be complete.
+        self.ordered = 0  #: scans up to which the channels have been seen in their order.
+        self.fault = ""  #: what went wrong, in words; empty while all is well.
         self._model = model
         self._rests = rests
         self._rate = nominal_rate

@@ -36,32 +36,20 @@ _SETTLE_TIMEOUT = 30.0
 
 @dataclass(frozen=True)
 class Arrival:
-    """What the port held at one moment.
+    """What the port held at one moment."""
 
-    Attributes:
-        time: s on the bench clock.
-        data: bytes; none where none came for a while.
-        emptied: whether nothing more was waiting behind them.
-        cut: why no more can come; empty where more may.
-    """
-
-    time: float
-    data: bytes
-    emptied: bool
-    cut: str
+    time: float  #: s on the bench clock.
+    data: bytes  #: bytes; none where none came for a while.
+    emptied: bool  #: whether nothing more was waiting behind them.
+    cut: str  #: why no more can come; empty where more may.
 
 
 @dataclass(frozen=True)
 class Position:
-    """A scan of one uninterrupted stretch of the stream.
+    """A scan of one uninterrupted stretch of the stream."""
 
-    Attributes:
-        stretch: 0 for the first, one more after every restart.
-        scan: from 0 within the stretch.
-    """
-
-    stretch: int
-    scan: int
+    stretch: int  #: 0 for the first, one more after every restart.
+    scan: int  #: from 0 within the stretch.
 
 
 class ScanStream:
@@ -73,17 +61,13 @@ class ScanStream:
         nominal_rate: Hz, scans a second.
         rests: what the channels rest at.
         memory: s of samples kept.
-
-    Attributes:
-        losses: what went wrong since the beginning, in words.
-        drops: scans that were lost, or not taken while the box was being restarted.
     """
 
     def __init__(
         self, link: DataqLink, model: BoxModel, nominal_rate: float, rests: Rests, memory: float
     ) -> None:
-        self.losses: list[str] = []
-        self.drops = 0
+        self.losses: list[str] = []  #: what went wrong since the beginning, in words.
+        self.drops = 0  #: scans that were lost, or not taken while the box was being restarted.
         self._link = link
         self._model = model
         self._rate = nominal_rate

@@ -13,42 +13,25 @@ from harness.bench.microphone_take import BAD
 
 @dataclass(frozen=True)
 class Block:
-    """What one callback handed over.
+    """What one callback handed over."""
 
-    Attributes:
-        first: number of its first sample since the stream began.
-        arrived: s on the bench clock, at the callback.
-        age: s from its first sample's conversion to the callback, as PortAudio states it.
-        flags: of `harness.bench.microphone_take`.
-        counts: the bytes of its samples, all channels.
-    """
-
-    first: int
-    arrived: float
-    age: float
-    flags: int
-    counts: bytes
+    first: int  #: number of its first sample since the stream began.
+    arrived: float  #: s on the bench clock, at the callback.
+    age: float  #: s from its first sample's conversion to the callback, as PortAudio states it.
+    flags: int  #: of `harness.bench.microphone_take`.
+    counts: bytes  #: the bytes of its samples, all channels.
 
 
 @dataclass(frozen=True)
 class Format:
-    """How a microphone's bytes are read.
+    """How a microphone's bytes are read."""
 
-    Attributes:
-        rate: samples a second, nominal.
-        bits: 24 or 32, of one sample.
-        channels: interleaved in a block.
-        channel: which of them is the microphone, from 0.
-        block: samples in a block.
-        latency: s by which the card's times are late, as measured; taken off.
-    """
-
-    rate: int
-    bits: int
-    channels: int
-    channel: int
-    block: int
-    latency: float = 0.0
+    rate: int  #: samples a second, nominal.
+    bits: int  #: 24 or 32, of one sample.
+    channels: int  #: interleaved in a block.
+    channel: int  #: which of them is the microphone, from 0.
+    block: int  #: samples in a block.
+    latency: float = 0.0  #: s by which the card's times are late, as measured; taken off.
 
     @property
     def full_scale(self) -> int:
@@ -72,9 +55,6 @@ class Blocks:
     Args:
         capacity: how many blocks are kept.
         size: samples in a block.
-
-    Attributes:
-        bad: blocks since opening that must not be used.
     """
 
     def __init__(self, capacity: int, size: int) -> None:
@@ -83,7 +63,7 @@ class Blocks:
         # Re-entrant, so that what is waited for may look at the blocks.
         self._arrived = threading.Condition(threading.RLock())
         self._total = 0
-        self.bad = 0
+        self.bad = 0  #: blocks since opening that must not be used.
 
     def add(self, block: Block) -> None:
         """Keep a block and wake whoever waits for one."""
@@ -123,13 +103,10 @@ class Trigger:
         start: sample number from which to look.
         baseline: counts.
         threshold: counts.
-
-    Attributes:
-        index: number of the sample found; ``start`` until then.
     """
 
     def __init__(self, blocks: Blocks, form: Format, start: int, baseline: float, threshold: int) -> None:
-        self.index = start
+        self.index = start  #: number of the sample found; ``start`` until then.
         self._blocks = blocks
         self._form = form
         self._next = start

@@ -33,21 +33,13 @@ _MAD_TO_DEVIATION = 1.4826
 
 @dataclass(frozen=True)
 class SampleClock:
-    """A straight line from sample number to bench clock.
+    """A straight line from sample number to bench clock."""
 
-    Attributes:
-        index: the sample number at which the line is anchored.
-        time: s on the bench clock, of that sample.
-        rate: samples per bench-clock second.
-        residual: s, median distance of the blocks' measured times from the line.
-        uncertainty: s, standard deviation of the line at its anchor, as if blocks erred independently.
-    """
-
-    index: float
-    time: float
-    rate: float
-    residual: float
-    uncertainty: float
+    index: float  #: the sample number at which the line is anchored.
+    time: float  #: s on the bench clock, of that sample.
+    rate: float  #: samples per bench-clock second.
+    residual: float  #: s, median distance of the blocks' measured times from the line.
+    uncertainty: float  #: s, standard deviation of the line at its anchor, as if blocks erred independently.
 
     def times(self, indices: FloatArray) -> FloatArray:
         """Bench-clock seconds of samples, ``(n,)``."""

@@ -30,44 +30,26 @@ POSITION_TOLERANCE: Final = 0.5e-3  # m
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a motion ended.
+    """How a motion ended."""
 
-    Attributes:
-        value: what the caller is told.
-        error: what is raised instead.
-        latch: whether the program is ended and the arm stays stopped until it is opened again.
-    """
-
-    value: bool = True
-    error: TouchstoneError | None = None
-    latch: bool = False
+    value: bool = True  #: what the caller is told.
+    error: TouchstoneError | None = None  #: what is raised instead.
+    latch: bool = False  #: whether the program is ended and the arm stays stopped until it is opened again.
 
 
 @dataclass(eq=False)
 class Motion:
-    """A joint motion (``joints``) or a straight line (``pose``), and what may end it.
+    """A joint motion (``joints``) or a straight line (``pose``), and what may end it."""
 
-    Attributes:
-        id: of the request.
-        what: for messages.
-        joints: rad, of a joint motion.
-        pose: UR's pose vector, of a line.
-        near: rad, the joints a line starts from.
-        speed: rad/s or m/s.
-        acceleration: rad/s^2 or m/s^2.
-        guard: forces that end it.
-        deadline: s on the bench clock.
-    """
-
-    id: int
-    what: str
-    joints: list[float] | None
-    pose: list[float] | None
-    near: list[float]
-    speed: float
-    acceleration: float
-    guard: Guard
-    deadline: float
+    id: int  #: of the request.
+    what: str  #: for messages.
+    joints: list[float] | None  #: rad, of a joint motion.
+    pose: list[float] | None  #: UR's pose vector, of a line.
+    near: list[float]  #: rad, the joints a line starts from.
+    speed: float  #: rad/s or m/s.
+    acceleration: float  #: rad/s^2 or m/s^2.
+    guard: Guard  #: forces that end it.
+    deadline: float  #: s on the bench clock.
     _outcome: Outcome | None = None
     _count: int = -1
     _began: bool = False

@@ -21,19 +21,12 @@ ANY_TURN: Final = np.array([[-4 * math.pi] * 6, [4 * math.pi] * 6])  # the range
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Samples of a motion, the first at its start and the last at its target.
+    """Samples of a motion, the first at its start and the last at its target."""
 
-    Attributes:
-        joints: ``(n, 6)`` rad.
-        flange_positions: ``(n, 3)`` m in base.
-        tool_points: ``(n, points, 3)`` m in base.
-        seconds: ``(n - 1,)`` s from each sample to the next at the motion's greatest speed.
-    """
-
-    joints: FloatArray
-    flange_positions: FloatArray
-    tool_points: FloatArray
-    seconds: FloatArray
+    joints: FloatArray  #: ``(n, 6)`` rad.
+    flange_positions: FloatArray  #: ``(n, 3)`` m in base.
+    tool_points: FloatArray  #: ``(n, points, 3)`` m in base.
+    seconds: FloatArray  #: ``(n - 1,)`` s from each sample to the next at the motion's greatest speed.
 
     @property
     def greatest_tool_speed(self) -> float:

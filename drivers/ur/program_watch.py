@@ -33,17 +33,13 @@ class ProgramWatch:
         address: of the controller.
         stop: ends the program on the controller; called in the thread.
 
-    Attributes:
-        foreign: the first program that was not expected, in words; empty where there was none.
-        failure: why no messages come any more; empty while they may.
-
     Raises:
         BenchFault: the port does not answer.
     """
 
     def __init__(self, address: str, stop: Callable[[], None]) -> None:
-        self.foreign = ""
-        self.failure = ""
+        self.foreign = ""  #: the first program that was not expected, in words; empty where there was none.
+        self.failure = ""  #: why no messages come any more; empty while they may.
         self._address = address
         self._stop = stop
         self._expected = False

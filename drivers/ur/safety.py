@@ -31,41 +31,24 @@ _NOT_COMPLETE: Final = (
 
 @dataclass(frozen=True)
 class SafetyLimits:
-    """What the arm may be asked to do; part of the station.
+    """What the arm may be asked to do; part of the station."""
 
-    Attributes:
-        workspace_low: m, in base: the corner of the box that every tool point stays in.
-        workspace_high: m, in base: the opposite corner.
-        joint_low: rad.
-        joint_high: rad.
-        joint_step: rad, the most any joint may turn in one motion.
-        joint_speed: rad/s.
-        joint_acceleration: rad/s^2.
-        speed: m/s of any tool point, away from contact.
-        speed_near: m/s of any tool point, while seeking contact and within ``near`` of it.
-        near: m of flange travel around the last contact.
-        acceleration: m/s^2.
-        travel: m, the longest search for contact.
-        force_press: N; a motion during which the force grows beyond this is stopped.
-        force_any: N; beyond this the arm is stopped twice over and stays stopped.
-        patience: s that the controller's watchdog waits for this computer before it stops the arm.
-    """
-
-    workspace_low: Triple
-    workspace_high: Triple
-    joint_low: Six = (-TURN,) * 6
-    joint_high: Six = (TURN,) * 6
-    joint_step: float = math.pi
-    joint_speed: float = 1.5
-    joint_acceleration: float = 2.0
-    speed: float = 0.25
-    speed_near: float = 0.05
-    near: float = 0.01
-    acceleration: float = 1.5
-    travel: float = 0.2
-    force_press: float = 10.0
-    force_any: float = 25.0
+    workspace_low: Triple  #: m, in base: the corner of the box that every tool point stays in.
+    workspace_high: Triple  #: m, in base: the opposite corner.
+    joint_low: Six = (-TURN,) * 6  #: rad.
+    joint_high: Six = (TURN,) * 6  #: rad.
+    joint_step: float = math.pi  #: rad, the most any joint may turn in one motion.
+    joint_speed: float = 1.5  #: rad/s.
+    joint_acceleration: float = 2.0  #: rad/s^2.
+    speed: float = 0.25  #: m/s of any tool point, away from contact.
+    speed_near: float = 0.05  #: m/s of any tool point, while seeking contact and within ``near`` of it.
+    near: float = 0.01  #: m of flange travel around the last contact.
+    acceleration: float = 1.5  #: m/s^2.
+    travel: float = 0.2  #: m, the longest search for contact.
+    force_press: float = 10.0  #: N; a motion during which the force grows beyond this is stopped.
+    force_any: float = 25.0  #: N; beyond this the arm is stopped twice over and stays stopped.
     patience: float = 0.1
+    """s that the controller's watchdog waits for this computer before it stops the arm."""
 
     def __post_init__(self) -> None:
         for name, low, high in (

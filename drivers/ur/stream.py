@@ -34,19 +34,12 @@ class PacketSource(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Guard:
-    """Forces that end a motion.
+    """Forces that end a motion."""
 
-    Attributes:
-        press: N; ends the motion.
-        hard: N; ends it and latches.
-        contact: N along ``direction``, either sign; None where none is sought.
-        direction: ``(3,)`` unit vector in base.
-    """
-
-    press: float
-    hard: float
-    contact: float | None
-    direction: FloatArray
+    press: float  #: N; ends the motion.
+    hard: float  #: N; ends it and latches.
+    contact: float | None  #: N along ``direction``, either sign; None where none is sought.
+    direction: FloatArray  #: ``(3,)`` unit vector in base.
 
 
 @dataclass(frozen=True)

@@ -53,25 +53,16 @@ _LOOKED_BY = (SPACING, ROUNDS, SAMPLES, BLOCK)
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """A run's readings, brought as far as settings share: the height maps of its images.
+    """A run's readings, brought as far as settings share: the height maps of its images."""
 
-    Attributes:
-        observations: of the contacts.
-        heights: a height map for each; none where no setting looks at images.
-        model: the object and the sensor.
-        prior: of its orientation.
-        seed: of the draws.
-        shared: s of CPU time and on the clock that the height maps took.
-        refused_pictures: why a contact's picture is not used, by its number from 0; its height map is zero.
-    """
-
-    observations: tuple[Observation, ...]
-    heights: tuple[FloatArray, ...]
-    model: Model
-    prior: Prior
-    seed: int
-    shared: tuple[float, float]
+    observations: tuple[Observation, ...]  #: of the contacts.
+    heights: tuple[FloatArray, ...]  #: a height map for each; none where no setting looks at images.
+    model: Model  #: the object and the sensor.
+    prior: Prior  #: of its orientation.
+    seed: int  #: of the draws.
+    shared: tuple[float, float]  #: s of CPU time and on the clock that the height maps took.
     refused_pictures: Mapping[int, str] = field(default_factory=dict)
+    """why a contact's picture is not used, by its number from 0; its height map is zero."""
 
     @property
     def pictured(self) -> bool:
@@ -106,15 +97,11 @@ class Readings:
 
 @dataclass(frozen=True, eq=False)
 class Models:
-    """The models of one object, one for each choice of the simulation's dials; each is made on first use.
+    """The models of one object, one for each choice of the simulation's dials; each is made on first use."""
 
-    Attributes:
-        make: of the accuracy that chooses the simulation.
-        start: levels of the simulation that a setting turns from: those of the object's ObjectFile.
-    """
-
-    make: Callable[[Accuracy], Model]
+    make: Callable[[Accuracy], Model]  #: of the accuracy that chooses the simulation.
     start: Setting = field(default_factory=dict)
+    """levels of the simulation that a setting turns from: those of the object's ObjectFile."""
     _made: dict[tuple[Level, ...], Model] = field(init=False, default_factory=dict, repr=False)
 
     def at(self, setting: Setting) -> Model:
@@ -259,30 +246,22 @@ def _widened(stated: Estimate, wider: Estimate, factor: float) -> Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What the recording says of its last contact.
+    """What the recording says of its last contact."""
 
-    Attributes:
-        observations: the contacts as recorded.
-        heights: ``(rows, columns)`` metres of indentation of each contact, from its images.
-        model: the object and the sensor.
-        prior: what was believed of the object's orientation.
-        last: the answer.
-        seconds: of the answer, from images to region; the surface's samples are made once before, and kernels
-            are loaded.
-        sense: what ``last`` is by.
-        others: the answer by each other sense, or why that sense refused the object.
-        refused_pictures: why a contact's picture is left out, by its number from 0; its height map is zero.
-    """
-
-    observations: tuple[Observation, ...]
+    observations: tuple[Observation, ...]  #: the contacts as recorded.
     heights: tuple[FloatArray, ...]
-    model: Model
-    prior: Prior
-    last: Estimate
+    """``(rows, columns)`` metres of indentation of each contact, from its images."""
+    model: Model  #: the object and the sensor.
+    prior: Prior  #: what was believed of the object's orientation.
+    last: Estimate  #: the answer.
     seconds: float
-    sense: Senses = "touch"
+    """of the answer, from images to region; the surface's samples are made once before, and kernels are
+    loaded."""
+    sense: Senses = "touch"  #: what ``last`` is by.
     others: Mapping[Senses, Estimate | FitRefused] = field(default_factory=dict)
+    """the answer by each other sense, or why that sense refused the object."""
     refused_pictures: Mapping[int, str] = field(default_factory=dict)
+    """why a contact's picture is left out, by its number from 0; its height map is zero."""
 
     @property
     def by_sense(self) -> dict[Senses, Estimate | FitRefused]:

@@ -32,17 +32,11 @@ _GOLDEN = 0.6180339887498949
 
 @dataclass(frozen=True, eq=False)
 class Turning:
-    """The turns about one vertical line that leave the object as it was.
+    """The turns about one vertical line that leave the object as it was."""
 
-    Attributes:
-        centre: ``(3,)`` metres, a point of the line, in the object's frame.
-        up: ``(3,)`` unit, the vertical in the object's frame.
-        fold: how many steps make a turn; 1 for none, 0 for any angle.
-    """
-
-    centre: FloatArray
-    up: FloatArray
-    fold: int
+    centre: FloatArray  #: ``(3,)`` metres, a point of the line, in the object's frame.
+    up: FloatArray  #: ``(3,)`` unit, the vertical in the object's frame.
+    fold: int  #: how many steps make a turn; 1 for none, 0 for any angle.
 
     @property
     def period(self) -> float:
@@ -102,17 +96,12 @@ def turning_of(mesh: Mesh, up: FloatArray) -> Turning:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is believed of the object's orientation. Its position is never given.
+    """What is believed of the object's orientation. Its position is never given."""
 
-    Attributes:
-        base_from_object: ``(3, 3)`` nominal rotation.
-        yaw: ``"known"`` to ``yaw_sigma``, or ``"unknown"``: upright, turned by any angle.
-        yaw_sigma: rad, about the vertical of the base, where the yaw is known.
-    """
-
-    base_from_object: FloatArray
+    base_from_object: FloatArray  #: ``(3, 3)`` nominal rotation.
     yaw: Literal["known", "unknown"] = "known"
-    yaw_sigma: float = USUAL.yaw
+    """``"known"`` to ``yaw_sigma``, or ``"unknown"``: upright, turned by any angle."""
+    yaw_sigma: float = USUAL.yaw  #: rad, about the vertical of the base, where the yaw is known.
 
     def __post_init__(self) -> None:
         rotation = np.asarray(self.base_from_object, dtype=np.float64)
@@ -144,29 +133,19 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The object and the sensor as the estimator knows them.
+    """The object and the sensor as the estimator knows them."""
 
-    Attributes:
-        mesh: of the object, in metres.
-        sensor: its geometry.
-        calibration: of its colours, fitted to presses of this sensor.
-        modes: of the object; None where no sound is compared.
-        material: of the object; None where no sound is compared.
-        seen: the object along the tool, which candidates' tactile images are crops of; None for the mesh's.
-        errors: of the bench that the readings are from, as its station states them.
-        sound_refusal: why no sound can be compared that the scene calls for; empty where one can.
-        seen_rms: m, root mean square over a whole image, that ``seen`` is itself off by.
-    """
-
-    mesh: Mesh
-    sensor: TactileSensor
-    calibration: TactileCalibration
-    modes: Modes | None = None
-    material: Material | None = None
+    mesh: Mesh  #: of the object, in metres.
+    sensor: TactileSensor  #: its geometry.
+    calibration: TactileCalibration  #: of its colours, fitted to presses of this sensor.
+    modes: Modes | None = None  #: of the object; None where no sound is compared.
+    material: Material | None = None  #: of the object; None where no sound is compared.
     seen: FirstSurface | None = None
+    """the object along the tool, which candidates' tactile images are crops of; None for the mesh's."""
     errors: BenchErrors = field(default_factory=BenchErrors)
-    sound_refusal: str = ""
-    seen_rms: float = 0.0
+    """of the bench that the readings are from, as its station states them."""
+    sound_refusal: str = ""  #: why no sound can be compared that the scene calls for; empty where one can.
+    seen_rms: float = 0.0  #: m, root mean square over a whole image, that ``seen`` is itself off by.
     _surfaces: dict[float, Surface] = field(init=False, default_factory=dict, repr=False)
 
     _gains: dict[float, GainTable] = field(init=False, default_factory=dict, repr=False)

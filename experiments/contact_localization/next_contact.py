@@ -216,19 +216,12 @@ HYPOTHESES = 80
 
 @dataclass(frozen=True, eq=False)
 class BelievedGels:
-    """Where the gel was at the first contact, by some hypotheses.
+    """Where the gel was at the first contact, by some hypotheses."""
 
-    Attributes:
-        gels: ``(n, 3)`` m, its centre in the object's frame.
-        object_from_base: ``(n, 3, 3)`` rotations.
-        weights: ``(n,)`` summing to 1.
-        first_in_base: ``(3,)`` m: where the arm says that it was; only what is added to it counts.
-    """
-
-    gels: FloatArray
-    object_from_base: FloatArray
-    weights: FloatArray
-    first_in_base: FloatArray
+    gels: FloatArray  #: ``(n, 3)`` m, its centre in the object's frame.
+    object_from_base: FloatArray  #: ``(n, 3, 3)`` rotations.
+    weights: FloatArray  #: ``(n,)`` summing to 1.
+    first_in_base: FloatArray  #: ``(3,)`` m: where the arm says that it was; only what is added to it counts.
 
 
 def believed_gels(hypotheses: Hypotheses, prior: Prior, first_in_base: FloatArray) -> BelievedGels:

@@ -55,19 +55,12 @@ _LEAST = 1.0
 
 @dataclass(frozen=True, eq=False)
 class HexahedralModes:
-    """Free vibration of cubes.
+    """Free vibration of cubes."""
 
-    Attributes:
-        frequencies: ``(m,)`` Hz, ascending.
-        nodes: ``(n, 3)`` m, in the object's frame.
-        shapes: ``(n, m, 3)`` 1/sqrt(kg), mass-normalised.
-        cubes: number of elements.
-    """
-
-    frequencies: FloatArray
-    nodes: FloatArray
-    shapes: FloatArray
-    cubes: int
+    frequencies: FloatArray  #: ``(m,)`` Hz, ascending.
+    nodes: FloatArray  #: ``(n, 3)`` m, in the object's frame.
+    shapes: FloatArray  #: ``(n, m, 3)`` 1/sqrt(kg), mass-normalised.
+    cubes: int  #: number of elements.
 
     def at(self, point: FloatArray) -> FloatArray:
         """``(m, 3)`` 1/sqrt(kg): mean over the nodes nearest to a ``(3,)`` place in m."""

@@ -53,31 +53,18 @@ KILO_OSF: Final = CellsSpec(PAPER, places=1_500_000, steps=600)
 
 @dataclass(frozen=True)
 class FieldSpec:
-    """One network for the look of an object, and its training by Adam.
+    """One network for the look of an object, and its training by Adam."""
 
-    Attributes:
-        depth: hidden layers of the trunk.
-        width: of each.
-        octaves: of the place's encoding.
-        turns: octaves of the view's and the light's.
-        samples: of a ray.
-        places: beside the surface that are learned from.
-        steps: of Adam; its rate falls to zero as half a cosine.
-        batch: places in a step, and half as many of the whole ball.
-        rate: of the first steps.
-        opacity: weight of the density's error beside the colour's.
-    """
-
-    depth: int = 4
-    width: int = 128
-    octaves: int = 7
-    turns: int = 4
-    samples: int = 128
-    places: int = 1_000_000
-    steps: int = 800
-    batch: int = 8192
-    rate: float = 3e-3
-    opacity: float = 0.05
+    depth: int = 4  #: hidden layers of the trunk.
+    width: int = 128  #: of each.
+    octaves: int = 7  #: of the place's encoding.
+    turns: int = 4  #: octaves of the view's and the light's.
+    samples: int = 128  #: of a ray.
+    places: int = 1_000_000  #: beside the surface that are learned from.
+    steps: int = 800  #: of Adam; its rate falls to zero as half a cosine.
+    batch: int = 8192  #: places in a step, and half as many of the whole ball.
+    rate: float = 3e-3  #: of the first steps.
+    opacity: float = 0.05  #: weight of the density's error beside the colour's.
 
 
 FIELD: Final = FieldSpec()
@@ -92,17 +79,11 @@ SAMPLES = 8
 
 @dataclass(frozen=True, eq=False)
 class ViewBench:
-    """Pictures of 256 x 256 pixels before white, as shown on a screen.
+    """Pictures of 256 x 256 pixels before white, as shown on a screen."""
 
-    Attributes:
-        lit: the object with its colours.
-        views: cameras and lights, none of which is learned from.
-        references: one a view.
-    """
-
-    lit: LitObject
-    views: HeldOutViews
-    references: tuple[ByteArray, ...]
+    lit: LitObject  #: the object with its colours.
+    views: HeldOutViews  #: cameras and lights, none of which is learned from.
+    references: tuple[ByteArray, ...]  #: one a view.
 
     sense: Sense = "vision"
 
@@ -187,19 +168,12 @@ RawField = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class UniformField:
-    """The trained network, ready for pictures.
+    """The trained network, ready for pictures."""
 
-    Attributes:
-        field: of places in the frame of the ball.
-        middle: ``(3,)`` m, of the ball.
-        radius: m.
-        samples: of a ray.
-    """
-
-    field: RawField
-    middle: FloatArray
-    radius: float
-    samples: int
+    field: RawField  #: of places in the frame of the ball.
+    middle: FloatArray  #: ``(3,)`` m, of the ball.
+    radius: float  #: m.
+    samples: int  #: of a ray.
 
     def picture(self, camera: Pinhole, light: DirectionalLight) -> ByteArray:
         """``(rows, columns, 3)`` before white."""

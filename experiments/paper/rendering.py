@@ -55,47 +55,30 @@ class RenderingBench(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class MadeMethod:
-    """A method ready to render.
+    """A method ready to render."""
 
-    Attributes:
-        render: renders one query.
-        seconds: CPU s of fitting or training; 0 where nothing was made here.
-    """
-
-    render: Render
-    seconds: float = 0.0
+    render: Render  #: renders one query.
+    seconds: float = 0.0  #: CPU s of fitting or training; 0 where nothing was made here.
 
 
 @dataclass(frozen=True, eq=False)
 class RenderingMethod:
-    """One way from a query to an observation.
+    """One way from a query to an observation."""
 
-    Attributes:
-        name: of its row.
-        column: the row of tables 1 and 2 that it fills.
-        identity: of all that it depends on beside the bench; a digest takes it.
-        make: fits, trains or opens it; raises ``TorchMissing`` where it cannot be trained.
-        note: what a reader has to know of it.
-    """
-
-    name: str
-    column: Column
-    identity: tuple[object, ...]
+    name: str  #: of its row.
+    column: Column  #: the row of tables 1 and 2 that it fills.
+    identity: tuple[object, ...]  #: of all that it depends on beside the bench; a digest takes it.
     make: Callable[[], MadeMethod]
-    note: str = ""
+    """fits, trains or opens it; raises ``TorchMissing`` where it cannot be trained."""
+    note: str = ""  #: what a reader has to know of it.
 
 
 @dataclass(frozen=True)
 class RenderingWork:
-    """Where results lie and who is informed.
+    """Where results lie and who is informed."""
 
-    Attributes:
-        store: of reference solutions, networks and measured cells.
-        report: takes what is being done and the share of it that is done.
-    """
-
-    store: Store
-    report: Report
+    store: Store  #: of reference solutions, networks and measured cells.
+    report: Report  #: takes what is being done and the share of it that is done.
 
 
 def picture_scores(rendered: AnyArray, reference: AnyArray) -> dict[str, float]:
@@ -106,23 +89,14 @@ def picture_scores(rendered: AnyArray, reference: AnyArray) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class FitSpec:
-    """A perceptron and its training by Adam.
+    """A perceptron and its training by Adam."""
 
-    Attributes:
-        depth: hidden layers.
-        width: of each.
-        octaves: of the encoding.
-        steps: of Adam; its rate falls to zero as half a cosine.
-        batch: rows in a step.
-        rate: of the first steps.
-    """
-
-    depth: int = 4
-    width: int = 256
-    octaves: int = 10
-    steps: int = 300
-    batch: int = 8192
-    rate: float = 2e-3
+    depth: int = 4  #: hidden layers.
+    width: int = 256  #: of each.
+    octaves: int = 10  #: of the encoding.
+    steps: int = 300  #: of Adam; its rate falls to zero as half a cosine.
+    batch: int = 8192  #: rows in a step.
+    rate: float = 2e-3  #: of the first steps.
 
 
 GRAPH_VERSION = "baseline graph"
@@ -184,21 +158,13 @@ _LEAST_ROUNDS = 2
 
 @dataclass(frozen=True, eq=False)
 class MeasuredMethod:
-    """A method with its worth.
+    """A method with its worth."""
 
-    Attributes:
-        method: that was measured.
-        scores: ``(n,)`` of each metric; empty where it could not be made.
-        seconds: ``(k,)`` CPU s of one thread, of one observation each; empty likewise.
-        made: CPU s of fitting or training.
-        missing: why it could not be made; empty where it was.
-    """
-
-    method: RenderingMethod
-    scores: Mapping[str, FloatArray]
-    seconds: FloatArray
-    made: float = 0.0
-    missing: str = ""
+    method: RenderingMethod  #: that was measured.
+    scores: Mapping[str, FloatArray]  #: ``(n,)`` of each metric; empty where it could not be made.
+    seconds: FloatArray  #: ``(k,)`` CPU s of one thread, of one observation each; empty likewise.
+    made: float = 0.0  #: CPU s of fitting or training.
+    missing: str = ""  #: why it could not be made; empty where it was.
 
 
 class _Workshop:

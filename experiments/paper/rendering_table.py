@@ -74,47 +74,29 @@ UPRIGHT = ", upright presses alone"
 
 @dataclass(frozen=True)
 class RenderingCounts:
-    """How many queries each sense is measured on.
+    """How many queries each sense is measured on."""
 
-    Attributes:
-        views: pictures.
-        strikes: held-out places that are struck.
-        presses: that are drawn; impossible ones are left out.
-    """
-
-    views: int = 4
-    strikes: int = 30
-    presses: int = 60
+    views: int = 4  #: pictures.
+    strikes: int = 30  #: held-out places that are struck.
+    presses: int = 60  #: that are drawn; impossible ones are left out.
 
 
 @dataclass(frozen=True)
 class RenderingRow:
-    """One row of one sense.
+    """One row of one sense."""
 
-    Attributes:
-        object: name; ``"quoted"`` of what the paper prints.
-        sense: of the row.
-        method: its name.
-        column: the row of tables 1 and 2 that it fills.
-        seconds: s of one observation: median, lower and upper quartile; None where there is none. Of quoted
-            rows the paper's number thrice.
-        timings: observations that were timed; 0 of quoted rows.
-        metrics: means over queries with their 90 % intervals, by the paper's name.
-        queries: that these are means over.
-        made: CPU s of fitting or training here.
-        note: what a reader has to know.
-    """
-
-    object: str
-    sense: Sense
-    method: str
-    column: str
+    object: str  #: name; ``"quoted"`` of what the paper prints.
+    sense: Sense  #: of the row.
+    method: str  #: its name.
+    column: str  #: the row of tables 1 and 2 that it fills.
     seconds: tuple[float, float, float] | None
-    timings: int
-    metrics: Mapping[str, Interval]
-    queries: int
-    made: float
-    note: str
+    """s of one observation: median, lower and upper quartile; None where there is none. Of quoted rows the
+    paper's number thrice."""
+    timings: int  #: observations that were timed; 0 of quoted rows.
+    metrics: Mapping[str, Interval]  #: means over queries with their 90 % intervals, by the paper's name.
+    queries: int  #: that these are means over.
+    made: float  #: CPU s of fitting or training here.
+    note: str  #: what a reader has to know.
 
 
 def quoted_rows() -> list[RenderingRow]:

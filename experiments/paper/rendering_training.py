@@ -146,11 +146,7 @@ _UNIFORM = 0.5
 
 
 class SpectrumRows:
-    """Bins of spectra of trained nodes, drawn at random.
-
-    Attributes:
-        scale: that the network's outputs are divided by.
-    """
+    """Bins of spectra of trained nodes, drawn at random."""
 
     def __init__(self, bench: StrikeBench, basis: SpectrumBasis, batch: int) -> None:
         self._batch, self._basis = batch, basis
@@ -165,6 +161,7 @@ class SpectrumRows:
         self._shares = _UNIFORM / len(energy) + (1.0 - _UNIFORM) * energy / energy.sum()
         self._cumulated = np.cumsum(self._shares)
         self.scale = float(np.sqrt((self._shares * energy).sum()))
+        """that the network's outputs are divided by."""
 
     def __call__(self, random: np.random.Generator) -> tuple[FloatArray, AnyArray, AnyArray]:
         """``(batch, 5)`` inputs, ``(batch, 6)`` scaled values, weights that undo how bins are drawn."""
@@ -287,21 +284,13 @@ class OsfField(nn.Module):
 
 @dataclass(frozen=True, eq=False)
 class FieldRows:
-    """What a field learns from, in the frame of the ball.
+    """What a field learns from, in the frame of the ball."""
 
-    Attributes:
-        lessons: places beside the surface, under lamps of their own.
-        points: ``(n, 3)`` of these.
-        shown: ``(n, 3)`` their colours as shown, 0 to 1.
-        space: ``(m, 3)`` places of the whole ball.
-        inside: ``(m,)`` whether the object is there.
-    """
-
-    lessons: Lessons
-    points: FloatArray
-    shown: AnyArray
-    space: FloatArray
-    inside: BoolArray
+    lessons: Lessons  #: places beside the surface, under lamps of their own.
+    points: FloatArray  #: ``(n, 3)`` of these.
+    shown: AnyArray  #: ``(n, 3)`` their colours as shown, 0 to 1.
+    space: FloatArray  #: ``(m, 3)`` places of the whole ball.
+    inside: BoolArray  #: ``(m,)`` whether the object is there.
 
     @classmethod
     def drawn(cls, bench: ViewBench, spec: FieldSpec) -> "FieldRows":

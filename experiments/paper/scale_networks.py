@@ -145,15 +145,10 @@ _TRAIN = "python -m experiments.paper.train scale --to FOLDER"
 
 @dataclass(frozen=True, eq=False)
 class PaperNetwork:
-    """A trained network.
+    """A trained network."""
 
-    Attributes:
-        network: that runs it.
-        card: where it comes from and what it reaches.
-    """
-
-    network: Network
-    card: Mapping[str, object]
+    network: Network  #: that runs it.
+    card: Mapping[str, object]  #: where it comes from and what it reaches.
 
     def size(self, views: Sequence[Mapping[str, FloatArray]]) -> float:
         """M: the geometric mean of the sizes of one or more readings of one object.

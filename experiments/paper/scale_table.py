@@ -296,19 +296,13 @@ _Views = list[dict[str, FloatArray]]
 
 @dataclass(frozen=True, eq=False)
 class PaperReadings:
-    """The readings of a run as the paper has them: no poses, no material.
-
-    Attributes:
-        pictures: ``(rows, columns, 3)`` RGB with the object and without it; None without a look.
-        focal_px: pixels of the camera's focal length.
-        strikes: all that were made.
-        patches: of the contacts that met the object, in their order.
-    """
+    """The readings of a run as the paper has them: no poses, no material."""
 
     pictures: tuple[ByteArray, ByteArray] | None
-    focal_px: float
-    strikes: Sequence[Strike]
-    patches: Sequence[Patch]
+    """``(rows, columns, 3)`` RGB with the object and without it; None without a look."""
+    focal_px: float  #: pixels of the camera's focal length.
+    strikes: Sequence[Strike]  #: all that were made.
+    patches: Sequence[Patch]  #: of the contacts that met the object, in their order.
 
     def views(self, sense: str) -> _Views:
         """The inputs of a sense's network, one or more.

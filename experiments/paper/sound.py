@@ -58,21 +58,13 @@ STRIKE_SEED = 0
 
 @dataclass(frozen=True, eq=False)
 class StrikeBench:
-    """Unit impulses along the normal at held-out nodes.
+    """Unit impulses along the normal at held-out nodes."""
 
-    Attributes:
-        mesh: of the object.
-        material: of all of it.
-        modes: of the reference, quadratic tetrahedra, canonical.
-        split: of its surface's nodes.
-        nodes: ``(n,)`` held-out nodes that are struck.
-    """
-
-    mesh: Mesh
-    material: Material
-    modes: Modes
-    split: Split
-    nodes: AnyArray
+    mesh: Mesh  #: of the object.
+    material: Material  #: of all of it.
+    modes: Modes  #: of the reference, quadratic tetrahedra, canonical.
+    split: Split  #: of its surface's nodes.
+    nodes: AnyArray  #: ``(n,)`` held-out nodes that are struck.
 
     sense: Sense = "audio"
 
@@ -157,15 +149,10 @@ SPECTRUM_FILE = "audio_spectrum.onnx"
 
 @dataclass(frozen=True, eq=False)
 class SpectrumBasis:
-    """Short-time spectra of single modes: that of a strike is their sum, each times its gain.
+    """Short-time spectra of single modes: that of a strike is their sum, each times its gain."""
 
-    Attributes:
-        spectra: ``(m, f, t)`` complex64, of each mode below 8 kHz with a gain of 1.
-        modes: ``(m,)`` which modes of the object these are.
-    """
-
-    spectra: AnyArray
-    modes: AnyArray
+    spectra: AnyArray  #: ``(m, f, t)`` complex64, of each mode below 8 kHz with a gain of 1.
+    modes: AnyArray  #: ``(m,)`` which modes of the object these are.
 
     @classmethod
     def of(cls, bench: StrikeBench) -> "SpectrumBasis":
@@ -206,19 +193,12 @@ def sound_of_spectrum(spectrum: AnyArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class SpectrumNetwork:
-    """The trained network, ready to be queried.
+    """The trained network, ready to be queried."""
 
-    Attributes:
-        network: five numbers of a bin to six.
-        low: ``(3,)`` m, of the box in which places are 0 to 1.
-        high: ``(3,)`` m.
-        basis: gives the bins.
-    """
-
-    network: Network
-    low: FloatArray
-    high: FloatArray
-    basis: SpectrumBasis
+    network: Network  #: five numbers of a bin to six.
+    low: FloatArray  #: ``(3,)`` m, of the box in which places are 0 to 1.
+    high: FloatArray  #: ``(3,)`` m.
+    basis: SpectrumBasis  #: gives the bins.
 
     def sound(self, point: FloatArray, normal: FloatArray) -> FloatArray:
         """``(t,)``: what a unit impulse along ``(3,)`` a normal at ``(3,)`` a place sounds like."""

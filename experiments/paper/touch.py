@@ -83,19 +83,12 @@ Kind = Literal["any", "upright"]
 
 @dataclass(frozen=True, eq=False)
 class TouchBench:
-    """Presses of 2.0's range at random places, without yaw, or of 1.0's: upright and equally deep.
+    """Presses of 2.0's range at random places, without yaw, or of 1.0's: upright and equally deep."""
 
-    Attributes:
-        places: where networks learn, with the rasteriser.
-        presses: that are possible.
-        maps: ``(n, rows, columns)`` m, of the reference.
-        calibration: of the colours.
-    """
-
-    places: PressBench
-    presses: Presses
-    maps: FloatArray
-    calibration: TactileCalibration
+    places: PressBench  #: where networks learn, with the rasteriser.
+    presses: Presses  #: that are possible.
+    maps: FloatArray  #: ``(n, rows, columns)`` m, of the reference.
+    calibration: TactileCalibration  #: of the colours.
 
     sense: Sense = "touch"
 
@@ -180,19 +173,12 @@ COLOURS_FILE = "touch_colours.onnx"
 
 @dataclass(frozen=True, eq=False)
 class ColourNetwork:
-    """The trained network, ready to be queried.
+    """The trained network, ready to be queried."""
 
-    Attributes:
-        network: five numbers of a pixel to a colour of -1 .. 1.
-        low: ``(3,)`` m, of the box in which places are 0 to 1.
-        high: ``(3,)`` m.
-        shape: rows and columns of a picture.
-    """
-
-    network: Network
-    low: FloatArray
-    high: FloatArray
-    shape: tuple[int, int]
+    network: Network  #: five numbers of a pixel to a colour of -1 .. 1.
+    low: FloatArray  #: ``(3,)`` m, of the box in which places are 0 to 1.
+    high: FloatArray  #: ``(3,)`` m.
+    shape: tuple[int, int]  #: rows and columns of a picture.
 
     def picture(self, point: FloatArray) -> ByteArray:
         """``(rows, columns, 3)`` of the press at a ``(3,)`` place in m."""

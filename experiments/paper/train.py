@@ -31,17 +31,11 @@ PROFILES = ("paper", "paper-smoke")
 
 @dataclass(frozen=True)
 class SizeAmounts:
-    """How much the networks of scale learn from, and for how long.
+    """How much the networks of scale learn from, and for how long."""
 
-    Attributes:
-        shapes: of the families, a tenth of them held out.
-        samples: draws of each shape, by sense.
-        epochs: by sense.
-    """
-
-    shapes: int
-    samples: MappingProxyType[str, int]
-    epochs: MappingProxyType[str, int]
+    shapes: int  #: of the families, a tenth of them held out.
+    samples: MappingProxyType[str, int]  #: draws of each shape, by sense.
+    epochs: MappingProxyType[str, int]  #: by sense.
 
 
 SIZE_AMOUNTS = MappingProxyType(

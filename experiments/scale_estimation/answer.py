@@ -54,21 +54,13 @@ Said = Sight | Hearing | Touch | ShapelessAnswer
 
 @dataclass(frozen=True, eq=False)
 class SizeAnswer:
-    """What a run says of a size.
+    """What a run says of a size."""
 
-    Attributes:
-        by_sense: the answer of each sense that was asked, or why it has none.
-        fused: all that answered, together; what is known without any where none did.
-        seconds: s of each sense's estimate, from readings to belief.
-        contacts: that touched something.
-        strikes: that may be used.
-    """
-
-    by_sense: Mapping[str, Said | FitRefused]
-    fused: Belief
-    seconds: Mapping[str, float]
-    contacts: int
-    strikes: int
+    by_sense: Mapping[str, Said | FitRefused]  #: the answer of each sense that was asked, or why it has none.
+    fused: Belief  #: all that answered, together; what is known without any where none did.
+    seconds: Mapping[str, float]  #: s of each sense's estimate, from readings to belief.
+    contacts: int  #: that touched something.
+    strikes: int  #: that may be used.
 
     @property
     def sight(self) -> Sight | None:

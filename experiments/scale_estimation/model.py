@@ -37,19 +37,12 @@ _SAMPLES = 60
 
 @dataclass(frozen=True, eq=False)
 class ObjectModel:
-    """An object of known shape.
+    """An object of known shape."""
 
-    Attributes:
-        mesh: in metres, at its nominal size.
-        scene: says how it stands, and which sizes it may have.
-        station: whose camera looks at it.
-        objectfile: reads the object's; None for the one that the scene names.
-    """
-
-    mesh: Mesh
-    scene: SceneFile
-    station: Station
-    objectfile: ReadFile | None = None
+    mesh: Mesh  #: in metres, at its nominal size.
+    scene: SceneFile  #: says how it stands, and which sizes it may have.
+    station: Station  #: whose camera looks at it.
+    objectfile: ReadFile | None = None  #: reads the object's; None for the one that the scene names.
     _ringing: dict[tuple[tuple[str, Level], ...], RingingModel] = field(
         default_factory=dict, init=False, repr=False
     )

@@ -49,15 +49,10 @@ CREDIBLE = 0.9
 
 @dataclass(frozen=True)
 class SizeRange:
-    """Sizes that an object may have.
+    """Sizes that an object may have."""
 
-    Attributes:
-        low: m, the least longest side of its bounding box.
-        high: m, the greatest.
-    """
-
-    low: float
-    high: float
+    low: float  #: m, the least longest side of its bounding box.
+    high: float  #: m, the greatest.
 
     def __post_init__(self) -> None:
         if not (np.isfinite([self.low, self.high]).all() and 0.0 < self.low < self.high):
@@ -89,15 +84,10 @@ class SizeRange:
 
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """What is believed of a size.
+    """What is believed of a size."""
 
-    Attributes:
-        range: of sizes asked about.
-        log_density: ``(n,)`` over ``range.logs``, normalised over all that is searched.
-    """
-
-    range: SizeRange
-    log_density: FloatArray
+    range: SizeRange  #: of sizes asked about.
+    log_density: FloatArray  #: ``(n,)`` over ``range.logs``, normalised over all that is searched.
 
     @classmethod
     def of(cls, range_: SizeRange, log_density: FloatArray) -> "Belief":

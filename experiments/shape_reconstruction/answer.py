@@ -20,17 +20,12 @@ SENSES = ("vision", "touch", "fused")
 
 @dataclass(frozen=True, eq=False)
 class ShapeAnswer:
-    """What a run says of a shape.
+    """What a run says of a shape."""
 
-    Attributes:
-        evidence: that it is made of.
-        by_sense: the surface by each sense that the scene asks for and by all, or why there is none.
-        seconds: s of each, the reading of its steps included.
-    """
-
-    evidence: ShapeEvidence
+    evidence: ShapeEvidence  #: that it is made of.
     by_sense: Mapping[str, ShapeEstimate | FitRefused]
-    seconds: Mapping[str, float]
+    """the surface by each sense that the scene asks for and by all, or why there is none."""
+    seconds: Mapping[str, float]  #: s of each, the reading of its steps included.
 
     @property
     def fused(self) -> ShapeEstimate:

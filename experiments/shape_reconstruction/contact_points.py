@@ -28,19 +28,13 @@ _BORDER = 1.0e-3
 
 @dataclass(frozen=True, eq=False)
 class ContactPoints:
-    """What the gel touched, in its own frame: z out of the sensor, towards the object.
+    """What the gel touched, in its own frame: z out of the sensor, towards the object."""
 
-    Attributes:
-        points: ``(n, 3)`` m.
-        normals: ``(n, 3)`` unit, out of the object.
-        error: m, one standard deviation of the points' heights by the picture alone.
-        clear: ``(k, 3)`` m, on the gel's face where it touched nothing: no part of the object is there.
-    """
-
-    points: FloatArray
-    normals: FloatArray
-    error: float
+    points: FloatArray  #: ``(n, 3)`` m.
+    normals: FloatArray  #: ``(n, 3)`` unit, out of the object.
+    error: float  #: m, one standard deviation of the points' heights by the picture alone.
     clear: FloatArray
+    """``(k, 3)`` m, on the gel's face where it touched nothing: no part of the object is there."""
 
 
 def contact_points(heights: FloatArray, errors: FloatArray, pitch: float) -> ContactPoints | None:

@@ -18,30 +18,21 @@ from harness.experiment.repeated_readings import PlaceTolerance, group_by_place
 
 @dataclass(frozen=True, eq=False)
 class GuardedTouch:
-    """One straight, guarded way of the gel, which ended at the object or met nothing.
-
-    Attributes:
-        stand_from_gel: ``(4, 4)`` at its end; the origin is the middle of the unpressed gel's face, z points
-            into the object.
-        way: m of it, straight along z: the sensor came from ``way`` farther back.
-        points: ``(n, 3)`` m, of the object's surface where the gel was pressed; none where it met nothing.
-        normals: ``(n, 3)`` unit, out of the object, at each point.
-        sigma: m, one standard deviation of the points along the normals, of each on its own.
-        normal_sigma: rad, one standard deviation of the normals.
-        index: the step of the run that it is.
-        clear: ``(k, 3)`` m, places of the unpressed gel's face that touched nothing where others did.
-        stopped: whether something ended its way before the line was at its end.
-    """
+    """One straight, guarded way of the gel, which ended at the object or met nothing."""
 
     stand_from_gel: FloatArray
-    way: float
+    """``(4, 4)`` at its end; the origin is the middle of the unpressed gel's face, z points into the
+    object."""
+    way: float  #: m of it, straight along z: the sensor came from ``way`` farther back.
     points: FloatArray
-    normals: FloatArray
-    sigma: float
-    normal_sigma: float
-    index: int
+    """``(n, 3)`` m, of the object's surface where the gel was pressed; none where it met nothing."""
+    normals: FloatArray  #: ``(n, 3)`` unit, out of the object, at each point.
+    sigma: float  #: m, one standard deviation of the points along the normals, of each on its own.
+    normal_sigma: float  #: rad, one standard deviation of the normals.
+    index: int  #: the step of the run that it is.
     clear: FloatArray = field(default_factory=lambda: read_only(np.zeros((0, 3))))
-    stopped: bool = False
+    """``(k, 3)`` m, places of the unpressed gel's face that touched nothing where others did."""
+    stopped: bool = False  #: whether something ended its way before the line was at its end.
 
     @property
     def by_housing(self) -> bool:
@@ -69,58 +60,40 @@ class GuardedTouch:
 
 @dataclass(frozen=True, eq=False)
 class SeenMask:
-    """The object's silhouette in the picture of a camera whose pose is known but for small errors.
-
-    Attributes:
-        mask: ``(rows, columns)`` bool, the object's pixels; holes through which the bench is seen are filled.
-        hidden: ``(rows, columns)`` bool, pixels of which nothing is known: something may stand before them.
-        stand_from_camera: ``(4, 4)``, OpenCV's axes: x right, y down, z forward.
-        focal_length: pixels; the optical axis is in the middle of the picture.
-        position_error: m, one standard deviation per axis of where the camera is.
-        rotation_error: rad, likewise, of how it is turned.
-        focal_length_error: relative.
-    """
+    """The object's silhouette in the picture of a camera whose pose is known but for small errors."""
 
     mask: BoolArray
+    """``(rows, columns)`` bool, the object's pixels; holes through which the bench is seen are filled."""
     hidden: BoolArray
-    stand_from_camera: FloatArray
-    focal_length: float
-    position_error: float
-    rotation_error: float
-    focal_length_error: float
+    """``(rows, columns)`` bool, pixels of which nothing is known: something may stand before them."""
+    stand_from_camera: FloatArray  #: ``(4, 4)``, OpenCV's axes: x right, y down, z forward.
+    focal_length: float  #: pixels; the optical axis is in the middle of the picture.
+    position_error: float  #: m, one standard deviation per axis of where the camera is.
+    rotation_error: float  #: rad, likewise, of how it is turned.
+    focal_length_error: float  #: relative.
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeEvidence:
-    """All readings of an object's shape.
+    """All readings of an object's shape."""
 
-    Attributes:
-        touches: every guarded way, those that met nothing too.
-        look: the silhouette; None where no camera looked, or it saw nothing.
-        housing: ``(x, y)`` m, sides of the sensor's flat housing, whose face lies ``gel_thickness`` behind
-            the gel's; what is behind that face for ``housing_depth`` is the sensor's, and free of the object.
-        gel_thickness: m.
-        housing_depth: m.
-        place_error: m, one standard deviation per axis of where on the support the object was put.
-        support_error: m, one standard deviation of the support's height.
-        largest: m, no side of the object is longer.
-        library: folder of known shapes, of which it may be one; None for those that come with the program.
-        supposed: ``(n, 3)`` m where the surface is supposed to be, by what was learnt from other objects; no
-            reading, and none unless an estimator asks for them.
-        errors: standard deviations of the bench; contacts whose poses agree within them are one reading.
-    """
-
-    touches: tuple[GuardedTouch, ...]
-    look: SeenMask | None
+    touches: tuple[GuardedTouch, ...]  #: every guarded way, those that met nothing too.
+    look: SeenMask | None  #: the silhouette; None where no camera looked, or it saw nothing.
     housing: tuple[float, float]
-    gel_thickness: float
-    housing_depth: float
-    place_error: float
-    support_error: float
-    largest: float
+    """``(x, y)`` m, sides of the sensor's flat housing, whose face lies ``gel_thickness`` behind the gel's;
+    what is behind that face for ``housing_depth`` is the sensor's, and free of the object."""
+    gel_thickness: float  #: m.
+    housing_depth: float  #: m.
+    place_error: float  #: m, one standard deviation per axis of where on the support the object was put.
+    support_error: float  #: m, one standard deviation of the support's height.
+    largest: float  #: m, no side of the object is longer.
     library: str | None = None
+    """folder of known shapes, of which it may be one; None for those that come with the program."""
     supposed: FloatArray = field(default_factory=lambda: read_only(np.zeros((0, 3))))
+    """``(n, 3)`` m where the surface is supposed to be, by what was learnt from other objects; no reading,
+    and none unless an estimator asks for them."""
     errors: BenchErrors = USUAL
+    """standard deviations of the bench; contacts whose poses agree within them are one reading."""
 
     def __post_init__(self) -> None:
         for touch in self.touches:

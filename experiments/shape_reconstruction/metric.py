@@ -32,45 +32,28 @@ _FAR = 0.95
 
 @dataclass(frozen=True)
 class ShapeError:
-    """How far an answer and the truth are apart.
-
-    Attributes:
-        chamfer: m, half the sum of ``accuracy`` and ``completeness`` (Chamfer-L1, distances not squared).
-        accuracy: m, mean distance from the answer to the truth.
-        completeness: m, mean distance from the truth to the answer.
-        touchable_completeness: m, the same from those of the truth's faces that a gel can come to; None where
-            nobody said which.
-        f_score: 0 to 1, harmonic mean of the shares that are within ``F_SCORE_WITHIN``.
-        hausdorff95: m, the greater of the two distances that 95 % of each surface are within.
-    """
+    """How far an answer and the truth are apart."""
 
     chamfer: float
-    accuracy: float
-    completeness: float
+    """m, half the sum of ``accuracy`` and ``completeness`` (Chamfer-L1, distances not squared)."""
+    accuracy: float  #: m, mean distance from the answer to the truth.
+    completeness: float  #: m, mean distance from the truth to the answer.
     touchable_completeness: float | None
-    f_score: float
-    hausdorff95: float
+    """m, the same from those of the truth's faces that a gel can come to; None where nobody said which."""
+    f_score: float  #: 0 to 1, harmonic mean of the shares that are within ``F_SCORE_WITHIN``.
+    hausdorff95: float  #: m, the greater of the two distances that 95 % of each surface are within.
 
 
 @dataclass(frozen=True, eq=False)
 class SurfacesApart:
-    """Samples of an answer and of the truth, even by area, each with its nearest place on the other surface.
+    """Samples of an estimate and of the truth, even by area, each with its nearest point on the other."""
 
-    Attributes:
-        answer: ``(n, 3)`` m, samples of the answer.
-        answer_faces: ``(n,)`` its faces that they are on.
-        towards_truth: ``(n,)`` m from each of them to the truth.
-        nearest: ``(n, 3)`` m, the answer's places nearest to samples of the truth.
-        nearest_faces: ``(n,)`` the answer's faces that those are on.
-        towards_answer: ``(n,)`` m from each of the truth's samples to its place.
-    """
-
-    answer: FloatArray
-    answer_faces: IntArray
-    towards_truth: FloatArray
-    nearest: FloatArray
-    nearest_faces: IntArray
-    towards_answer: FloatArray
+    answer: FloatArray  #: ``(n, 3)`` m, samples of the answer.
+    answer_faces: IntArray  #: ``(n,)`` its faces that they are on.
+    towards_truth: FloatArray  #: ``(n,)`` m from each of them to the truth.
+    nearest: FloatArray  #: ``(n, 3)`` m, the answer's places nearest to samples of the truth.
+    nearest_faces: IntArray  #: ``(n,)`` the answer's faces that those are on.
+    towards_answer: FloatArray  #: ``(n,)`` m from each of the truth's samples to its place.
 
     @property
     def error(self) -> ShapeError:
@@ -80,15 +63,10 @@ class SurfacesApart:
 
 @dataclass(frozen=True)
 class BandHeld:
-    """Shares, 0 to 1 and even by area, that are no farther off than the estimate's 90 % band says.
+    """Shares, 0 to 1 and even by area, that are no farther off than the estimate's 90 % band says."""
 
-    Attributes:
-        truth: of the true surface, by the band at the estimate's place nearest to each part of it.
-        answer: of the estimate's own surface, by the band there.
-    """
-
-    truth: float
-    answer: float
+    truth: float  #: of the true surface, by the band at the estimate's place nearest to each part of it.
+    answer: float  #: of the estimate's own surface, by the band there.
 
 
 def surfaces_apart(answer: Mesh, truth: Mesh, samples: int = SAMPLES, seed: int = 0) -> SurfacesApart:

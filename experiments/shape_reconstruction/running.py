@@ -60,17 +60,11 @@ MOST = 4
 
 @dataclass(frozen=True, eq=False)
 class LiveEstimate:
-    """What was known after a press.
+    """What was known after a press."""
 
-    Attributes:
-        presses: how many were made by then.
-        evidence: from them, and from the picture.
-        estimate: None where they said too little for one.
-    """
-
-    presses: int
-    evidence: ShapeEvidence
-    estimate: ShapeEstimate | None
+    presses: int  #: how many were made by then.
+    evidence: ShapeEvidence  #: from them, and from the picture.
+    estimate: ShapeEstimate | None  #: None where they said too little for one.
 
 
 def live_method(choose: Choice) -> str:

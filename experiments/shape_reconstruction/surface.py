@@ -12,24 +12,16 @@ SUPPOSED, SEEN, TOUCHED = 0, 1, 2
 
 @dataclass(frozen=True, eq=False)
 class ShapeEstimate:
-    """The surface of an object, by one estimator.
+    """The surface of an object, by one estimator."""
 
-    Attributes:
-        mesh: watertight, in the frame ``stand``, metres.
-        deviation: ``(vertices,)`` m, one standard deviation of the surface along its normal.
-        known_by: ``(vertices,)`` ``SUPPOSED``, ``SEEN`` or ``TOUCHED``.
-        not_bounded: names of the extents that no reading limits: ``"x"``, ``"y"``, ``"z"`` of ``stand``.
-        doubtful: indices of the touches that do not fit the rest, with m that each is off.
-        flags: short sentences that the answer must carry: ``"class unknown: mug or can"``.
-        seconds: of the estimate.
-        details: JSON values of what the estimator found beside: its kind, parameters, other hypotheses.
-    """
-
-    mesh: Mesh
-    deviation: FloatArray
-    known_by: IntArray
+    mesh: Mesh  #: watertight, in the frame ``stand``, metres.
+    deviation: FloatArray  #: ``(vertices,)`` m, one standard deviation of the surface along its normal.
+    known_by: IntArray  #: ``(vertices,)`` ``SUPPOSED``, ``SEEN`` or ``TOUCHED``.
     not_bounded: tuple[str, ...]
+    """names of the extents that no reading limits: ``"x"``, ``"y"``, ``"z"`` of ``stand``."""
     doubtful: Mapping[int, float]
-    flags: tuple[str, ...]
-    seconds: float
+    """indices of the touches that do not fit the rest, with m that each is off."""
+    flags: tuple[str, ...]  #: short sentences that the answer must carry: ``"class unknown: mug or can"``.
+    seconds: float  #: of the estimate.
     details: Mapping[str, object] = field(default_factory=dict)
+    """JSON values of what the estimator found beside: its kind, parameters, other hypotheses."""

@@ -65,17 +65,11 @@ GROSS = 10.0e-3
 
 @dataclass(frozen=True)
 class ShapeRow:
-    """What a row is answered from.
+    """What a row is answered from."""
 
-    Attributes:
-        method: of ``METHODS`` or ``POINTS``.
-        senses: ``"T"``, ``"V"`` or ``"TV"``.
-        presses: of the run, the first so many.
-    """
-
-    method: str
-    senses: str
-    presses: int
+    method: str  #: of ``METHODS`` or ``POINTS``.
+    senses: str  #: ``"T"``, ``"V"`` or ``"TV"``.
+    presses: int  #: of the run, the first so many.
 
     @property
     def name(self) -> str:

@@ -23,38 +23,24 @@ _MOST = 1.0e12
 
 @dataclass(frozen=True, eq=False)
 class SideBySide:
-    """A reading and what a model says of it, as a report shows them; no verdict reads it.
+    """A reading and what a model says of it, as a report shows them; no verdict reads it."""
 
-    Attributes:
-        live: ``(rows, columns)`` a field, or ``(n,)`` values in ascending order.
-        model: of the same shape for a field; ``(m,)`` for values.
-        unit: of both.
-    """
-
-    live: FloatArray
-    model: FloatArray
-    unit: str
+    live: FloatArray  #: ``(rows, columns)`` a field, or ``(n,)`` values in ascending order.
+    model: FloatArray  #: of the same shape for a field; ``(m,)`` for values.
+    unit: str  #: of both.
 
 
 @dataclass(frozen=True)
 class Residual:
-    """One reading less what a model says, in units of its noise.
+    """One reading less what a model says, in units of its noise."""
 
-    Attributes:
-        step: of the run, from 0; of what all steps have in common, the last that it was read at.
-        quantity: what was compared: ``"contact depth"``.
-        chi_square: 0 or more.
-        dof: its degrees of freedom, more than 0; need not be whole.
-        numbers: that it is made of, keys with their units.
-        sides: the reading and the model; None where the numbers are all of it.
-    """
-
-    step: int
-    quantity: str
-    chi_square: float
-    dof: float
-    numbers: Mapping[str, float] = field(default_factory=dict)
+    step: int  #: of the run, from 0; of what all steps have in common, the last that it was read at.
+    quantity: str  #: what was compared: ``"contact depth"``.
+    chi_square: float  #: 0 or more.
+    dof: float  #: its degrees of freedom, more than 0; need not be whole.
+    numbers: Mapping[str, float] = field(default_factory=dict)  #: that it is made of, keys with their units.
     sides: SideBySide | None = field(default=None, compare=False, repr=False)
+    """the reading and the model; None where the numbers are all of it."""
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.chi_square) and self.chi_square >= 0.0 and self.dof > 0.0):
@@ -67,39 +53,25 @@ class Residual:
 
 @dataclass(frozen=True)
 class SenseResiduals:
-    """What one sense was compared with, and the residuals.
+    """What one sense was compared with, and the residuals."""
 
-    Attributes:
-        sense: which.
-        source: what it is compared with.
-        residuals: in order of the steps; empty where it cannot be compared.
-        why: it cannot be compared, or what a reader must know of how it was.
-        seconds: of CPU that the comparison took.
-        refused_at: step of the first reading, where the calibration refuses all of them: none is left to
-            compare, and the sense does not fit.
-    """
-
-    sense: Sense
-    source: Source
-    residuals: tuple[Residual, ...]
-    why: str = ""
-    seconds: float = 0.0
+    sense: Sense  #: which.
+    source: Source  #: what it is compared with.
+    residuals: tuple[Residual, ...]  #: in order of the steps; empty where it cannot be compared.
+    why: str = ""  #: it cannot be compared, or what a reader must know of how it was.
+    seconds: float = 0.0  #: of CPU that the comparison took.
     refused_at: int | None = None
+    """step of the first reading, where the calibration refuses all of them: none is left to compare, and the
+    sense does not fit."""
 
 
 @dataclass(frozen=True)
 class JudgedSense:
-    """One sense with its verdict.
+    """One sense with its verdict."""
 
-    Attributes:
-        compared: its residuals.
-        verdict: of all of them together.
-        limits: for each residual, the chi-square beyond which it does not fit.
-    """
-
-    compared: SenseResiduals
-    verdict: Verdict
-    limits: tuple[float, ...]
+    compared: SenseResiduals  #: its residuals.
+    verdict: Verdict  #: of all of them together.
+    limits: tuple[float, ...]  #: for each residual, the chi-square beyond which it does not fit.
 
     @property
     def doubted(self) -> Residual | None:
@@ -115,17 +87,12 @@ class JudgedSense:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Every sense of a run against a model.
+    """Every sense of a run against a model."""
 
-    Attributes:
-        about: the object that was compared with.
-        false_alarm: probability that a right model is said not to fit.
-        senses: judged; touch and sound may be there twice, by the network and by the reference.
-    """
-
-    about: str
-    false_alarm: float
+    about: str  #: the object that was compared with.
+    false_alarm: float  #: probability that a right model is said not to fit.
     senses: tuple[JudgedSense, ...]
+    """judged; touch and sound may be there twice, by the network and by the reference."""
 
     @property
     def fits(self) -> bool:

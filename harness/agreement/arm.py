@@ -36,21 +36,13 @@ _NOTHING = -20e-3
 
 @dataclass(frozen=True, eq=False)
 class ContactDepth:
-    """How deep a contact was, by the picture and by the twin.
+    """How deep a contact was, by the picture and by the twin."""
 
-    Attributes:
-        step: of the run.
-        read: m, the deepest place of the gel.
-        expected: m that the twin's object reaches into the pad; 0 where it does not.
-        shared: ``(13,)`` m for one sigma of each error that contacts share.
-        own: m, one sigma of the contact's own.
-    """
-
-    step: int
-    read: float
-    expected: float
-    shared: FloatArray
-    own: float
+    step: int  #: of the run.
+    read: float  #: m, the deepest place of the gel.
+    expected: float  #: m that the twin's object reaches into the pad; 0 where it does not.
+    shared: FloatArray  #: ``(13,)`` m for one sigma of each error that contacts share.
+    own: float  #: m, one sigma of the contact's own.
 
 
 def compare_with_twin(

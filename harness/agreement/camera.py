@@ -34,16 +34,12 @@ _NEAREST = 1.0e-2
 
 @dataclass(frozen=True)
 class OutlineNoise:
-    """How far an outline in a picture may be from a model's, beside where the object stands.
+    """How far an outline in a picture may be from a model's, beside where the object stands."""
 
-    Attributes:
-        camera: of its place, rotation and focal length.
-        read: pixels, one sigma of how far an outline reaches in one direction: half a pixel's width, the
-            camera's noise, and what the surface is off by.
-    """
-
-    camera: CameraErrors = field(default_factory=CameraErrors)
+    camera: CameraErrors = field(default_factory=CameraErrors)  #: of its place, rotation and focal length.
     read: float = 0.7
+    """pixels, one sigma of how far an outline reaches in one direction: half a pixel's width, the camera's
+    noise, and what the surface is off by."""
 
 
 def compare_camera(

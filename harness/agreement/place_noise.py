@@ -18,29 +18,18 @@ SHARED = 13
 
 @dataclass(frozen=True)
 class PlaceNoise:
-    """One sigma of everything that may be off at a bench that was set up with care.
+    """One sigma of everything that may be off at a bench that was set up with care."""
 
-    Attributes:
-        position: m, of the object along each axis of the base.
-        yaw: rad, of the object.
-        tilt: rad, of the object about base x and y each.
-        scale: of the object's size over its model's, less 1.
-        gel_centre: m, along each axis of the gel's frame.
-        gel_tilt: rad, of the gel about its x and y each.
-        gel_yaw: rad, of its image about its z.
-        arm: m, of each contact along each axis: the arm's pose, and the surface's shape there.
-        arm_tilt: rad, of each contact about each axis.
-    """
-
-    position: float = 0.5e-3
-    yaw: float = USUAL.yaw
-    tilt: float = USUAL.tilt
-    scale: float = USUAL.scale
-    gel_centre: float = USUAL.gel_centre
-    gel_tilt: float = USUAL.gel_tilt
-    gel_yaw: float = USUAL.gel_yaw
+    position: float = 0.5e-3  #: m, of the object along each axis of the base.
+    yaw: float = USUAL.yaw  #: rad, of the object.
+    tilt: float = USUAL.tilt  #: rad, of the object about base x and y each.
+    scale: float = USUAL.scale  #: of the object's size over its model's, less 1.
+    gel_centre: float = USUAL.gel_centre  #: m, along each axis of the gel's frame.
+    gel_tilt: float = USUAL.gel_tilt  #: rad, of the gel about its x and y each.
+    gel_yaw: float = USUAL.gel_yaw  #: rad, of its image about its z.
     arm: float = USUAL.arm
-    arm_tilt: float = USUAL.arm_tilt
+    """m, of each contact along each axis: the arm's pose, and the surface's shape there."""
+    arm_tilt: float = USUAL.arm_tilt  #: rad, of each contact about each axis.
 
     @classmethod
     def at(cls, errors: BenchErrors) -> "PlaceNoise":

@@ -59,84 +59,57 @@ _NEXT = 0.01
 
 @dataclass(frozen=True)
 class ResonanceNoise:
-    """How far resonances heard may be from a model's modes.
+    """How far resonances heard may be from a model's modes."""
 
-    Attributes:
-        scale: one sigma of the logarithm of the factor that all frequencies share.
-        frequency: one sigma of the logarithm of each frequency's own.
-        reach: sigmas of ``frequency`` within which a mode explains a peak.
-        clutter: share of peaks that no mode explains.
-    """
-
-    scale: float = 0.05
-    frequency: float = 0.02
-    reach: float = 2.0
-    clutter: float = 0.2
+    scale: float = 0.05  #: one sigma of the logarithm of the factor that all frequencies share.
+    frequency: float = 0.02  #: one sigma of the logarithm of each frequency's own.
+    reach: float = 2.0  #: sigmas of ``frequency`` within which a mode explains a peak.
+    clutter: float = 0.2  #: share of peaks that no mode explains.
 
 
 @dataclass(frozen=True, eq=False)
 class ResonanceMatch:
-    """Peaks beside modes, under the likeliest common factor.
+    """Peaks beside modes, under the likeliest common factor."""
 
-    Attributes:
-        factor: of the object's frequencies over the model's.
-        explained: ``(peaks,)`` whether a mode lies near each.
-        chance: ``(peaks,)`` probability that a peak anywhere about it would have a mode that near.
-    """
-
-    factor: float
-    explained: BoolArray
-    chance: FloatArray
+    factor: float  #: of the object's frequencies over the model's.
+    explained: BoolArray  #: ``(peaks,)`` whether a mode lies near each.
+    chance: FloatArray  #: ``(peaks,)`` probability that a peak anywhere about it would have a mode that near.
 
 
 @dataclass(frozen=True)
 class ShareNoise:
-    """How far strikes' shares may be from a model's gains.
-
-    Attributes:
-        gain: of a mode's gain at a place, of its root mean square over surface and struck places together:
-            what the model is off by, in the median.
-        spread: one sigma of its logarithm: some modes are as they were computed, and some hardly.
-        shared: sigmas by which all modes of an object are off more, or less, together.
-        skirts: of the skirts that the modes around leave at a peak, what is left of them once a level part is
-            taken off.
-        counted: sigmas that one peak counts at most: a peak may be no mode's.
-        group: modes whose frequencies differ by less than this share are taken together.
-        most: modes that are taken together at most.
-        near: most logarithm between a peak's frequency and that of its modes.
-    """
+    """How far strikes' shares may be from a model's gains."""
 
     gain: float = 0.1
+    """of a mode's gain at a place, of its root mean square over surface and struck places together: what the
+    model is off by, in the median."""
     spread: float = 0.78
-    shared: float = 0.2
+    """one sigma of its logarithm: some modes are as they were computed, and some hardly."""
+    shared: float = 0.2  #: sigmas by which all modes of an object are off more, or less, together.
     skirts: float = 0.3
-    counted: float = 2.5
-    group: float = 0.01
-    most: int = 3
-    near: float = 0.04
+    """of the skirts that the modes around leave at a peak, what is left of them once a level part is taken
+    off."""
+    counted: float = 2.5  #: sigmas that one peak counts at most: a peak may be no mode's.
+    group: float = 0.01  #: modes whose frequencies differ by less than this share are taken together.
+    most: int = 3  #: modes that are taken together at most.
+    near: float = 0.04  #: most logarithm between a peak's frequency and that of its modes.
 
 
 @dataclass(frozen=True)
 class PhaseNoise:
-    """How far strikes may be out of phase at a resonance.
+    """How far strikes may be out of phase at a resonance."""
 
-    Attributes:
-        out_of_phase: share of a mode's energy that is out of phase, in the median.
-        spread: one sigma of its logarithm.
-        skirts: of the skirts that the modes around leave at a peak, what is left of them once a level part is
-            taken off.
-        alone: least logarithm between a mode's frequency and the next one's, of a mode that is alone.
-        broad: half width of a peak over its frequency, from which on it may be more than one mode whatever
-            the model says.
-        near: most logarithm between a peak's frequency and that of its mode.
-    """
-
-    out_of_phase: float = 0.8e-4
-    spread: float = 2.6
+    out_of_phase: float = 0.8e-4  #: share of a mode's energy that is out of phase, in the median.
+    spread: float = 2.6  #: one sigma of its logarithm.
     skirts: float = 0.5
+    """of the skirts that the modes around leave at a peak, what is left of them once a level part is taken
+    off."""
     alone: float = 0.04
+    """least logarithm between a mode's frequency and the next one's, of a mode that is alone."""
     broad: float = 0.004
-    near: float = 0.04
+    """half width of a peak over its frequency, from which on it may be more than one mode whatever the model
+    says."""
+    near: float = 0.04  #: most logarithm between a peak's frequency and that of its mode.
 
 
 def compare_sound(
@@ -178,19 +151,14 @@ def compare_sound(
 
 @dataclass(frozen=True, eq=False)
 class StruckModes:
-    """A model's modes where the strikes fell.
-
-    Attributes:
-        frequencies: ``(m,)`` Hz ascending, with the factor that the object's have over the model's.
-        gains: ``(K, m)`` 1/sqrt(kg), of each mode at each strike's place along the blow.
-        mean_squares: ``(m,)`` 1/kg, of its gain along the normal all over the surface.
-        error: of a gain, of its root mean square over the surface: what the source states of itself.
-    """
+    """A model's modes where the strikes fell."""
 
     frequencies: FloatArray
-    gains: FloatArray
-    mean_squares: FloatArray
+    """``(m,)`` Hz ascending, with the factor that the object's have over the model's."""
+    gains: FloatArray  #: ``(K, m)`` 1/sqrt(kg), of each mode at each strike's place along the blow.
+    mean_squares: FloatArray  #: ``(m,)`` 1/kg, of its gain along the normal all over the surface.
     error: float = 0.0
+    """of a gain, of its root mean square over the surface: what the source states of itself."""
 
     def __post_init__(self) -> None:
         count = len(self.frequencies)

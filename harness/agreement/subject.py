@@ -32,24 +32,16 @@ SEEN = 0.12e-3
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """An object, standing where a run's scene states.
+    """An object, standing where a run's scene states."""
 
-    Attributes:
-        run: whose readings are compared.
-        scene: of the run, with this object in it.
-        mesh: of the object, m, in its own frame.
-        material: it is made of.
-        objectfile: of the object; None without one.
-        levels: of the simulation's dials, but for the one that chooses between network and reference; what
-            they leave out is at its default.
-    """
-
-    run: RunFiles
-    scene: SceneFile
-    mesh: Mesh
-    material: Material
-    objectfile: ObjectFile | None
+    run: RunFiles  #: whose readings are compared.
+    scene: SceneFile  #: of the run, with this object in it.
+    mesh: Mesh  #: of the object, m, in its own frame.
+    material: Material  #: it is made of.
+    objectfile: ObjectFile | None  #: of the object; None without one.
     levels: Mapping[str, Level] = field(default_factory=dict)
+    """of the simulation's dials, but for the one that chooses between network and reference; what they leave
+    out is at its default."""
     _store: Store = field(default_factory=lambda: Store(default_folder()), repr=False)
     _made: dict[tuple[Modality, Source], dict[str, Any]] = field(default_factory=dict, repr=False, init=False)
 
@@ -157,19 +149,12 @@ def subject_of_file(run: RunFiles, folder: Path) -> Subject:
 
 @dataclass(frozen=True, eq=False)
 class PressedContact:
-    """One step that pressed the gel.
+    """One step that pressed the gel."""
 
-    Attributes:
-        step: of the run.
-        seen: as it was recorded.
-        heights: ``(rows, columns)`` m of indentation, by its picture; zeros where that is refused.
-        refusal: why its picture is not compared; empty where it is.
-    """
-
-    step: int
-    seen: Observation
-    heights: FloatArray
-    refusal: str = ""
+    step: int  #: of the run.
+    seen: Observation  #: as it was recorded.
+    heights: FloatArray  #: ``(rows, columns)`` m of indentation, by its picture; zeros where that is refused.
+    refusal: str = ""  #: why its picture is not compared; empty where it is.
 
     @property
     def touched(self) -> bool:

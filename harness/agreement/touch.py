@@ -56,33 +56,29 @@ _SHORTEN = (1.0, 0.5, 0.25, 0.1)
 
 @dataclass(frozen=True)
 class SurfaceNoise:
-    """How far a gel's surface by its picture may be from a model's.
-
-    Attributes:
-        rms: m, one sigma at the true pose, of the touched surface: the light's shading (0.03 mm), and as
-            much again of the object's small bends.
-        aside: m, one sigma of where an edge lies within a contact: times the slope there it adds to ``rms``.
-        gain: one sigma of how much higher or lower the picture shows the gel than it is, of its height.
-        skirt: m, one sigma of the blur by which the gel hangs farther from what it touches than modelled.
-        length: m over which errors of a surface are alike: so many of them stand side by side in a contact.
-        block: m, a side of the blocks of pixels that are averaged.
-        core: share of the deepest place above which a surface is compared: below it, it is the gel that
-            hangs from the contact, not the object that shapes it.
-        rim: m along the picture's border that are not compared: heights are integrated from slopes, and
-            beyond the border there are none.
-        most: sigmas that one block counts as at most, once the pose is found: a crease that the gel does not
-            reach is a few blocks far off, another object is all of them off.
-    """
+    """How far a gel's surface by its picture may be from a model's."""
 
     rms: float = 0.042e-3
+    """m, one sigma at the true pose, of the touched surface: the light's shading (0.03 mm), and as much again
+    of the object's small bends."""
     aside: float = 0.1e-3
+    """m, one sigma of where an edge lies within a contact: times the slope there it adds to ``rms``."""
     gain: float = 0.07
+    """one sigma of how much higher or lower the picture shows the gel than it is, of its height."""
     skirt: float = 0.7e-3
+    """m, one sigma of the blur by which the gel hangs farther from what it touches than modelled."""
     length: float = 3.0e-3
-    block: float = 0.6e-3
+    """m over which errors of a surface are alike: so many of them stand side by side in a contact."""
+    block: float = 0.6e-3  #: m, a side of the blocks of pixels that are averaged.
     core: float = 0.4
+    """share of the deepest place above which a surface is compared: below it, it is the gel that hangs from
+    the contact, not the object that shapes it."""
     rim: float = 1.2e-3
+    """m along the picture's border that are not compared: heights are integrated from slopes, and beyond the
+    border there are none."""
     most: float = 3.0
+    """sigmas that one block counts as at most, once the pose is found: a crease that the gel does not reach
+    is a few blocks far off, another object is all of them off."""
 
 
 def compare_touch(
@@ -126,28 +122,18 @@ def compare_touch(
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """A reading beside a model, at the likeliest pose.
+    """A reading beside a model, at the likeliest pose."""
 
-    Attributes:
-        read: ``(rows, columns)`` m of indentation, in blocks.
-        modelled: the same.
-        variances: ``(s, rows, columns)`` m^2 of their difference, for each of ``s`` errors of the source that
-            are as probable as each other.
-        compared: ``(rows, columns)`` where they were compared.
-        pitch: m, a side of a block.
-        twist: ``(6,)`` m and rad from the stated pose, in base.
-        gain: of the heights read over the model's.
-        prior: chi-square of twist, gain and skirt.
-    """
-
-    read: FloatArray
-    modelled: FloatArray
+    read: FloatArray  #: ``(rows, columns)`` m of indentation, in blocks.
+    modelled: FloatArray  #: the same.
     variances: FloatArray
-    compared: BoolArray
-    pitch: float
-    twist: FloatArray
-    gain: float
-    prior: float
+    """``(s, rows, columns)`` m^2 of their difference, for each of ``s`` errors of the source that are as
+    probable as each other."""
+    compared: BoolArray  #: ``(rows, columns)`` where they were compared.
+    pitch: float  #: m, a side of a block.
+    twist: FloatArray  #: ``(6,)`` m and rad from the stated pose, in base.
+    gain: float  #: of the heights read over the model's.
+    prior: float  #: chi-square of twist, gain and skirt.
 
 
 def surface_residual(step: int, found: Surfaces, noise: SurfaceNoise, gross: float = 0.0) -> Residual:

@@ -14,15 +14,10 @@ from harness.basics.npz_file import read_arrays, write_arrays
 
 @dataclass(frozen=True, eq=False)
 class TrainingProgress:
-    """How far a training has come.
+    """How far a training has come."""
 
-    Attributes:
-        epoch: that were trained.
-        losses: of what was trained.
-    """
-
-    epoch: int
-    losses: list[float]
+    epoch: int  #: that were trained.
+    losses: list[float]  #: of what was trained.
 
 
 def write_checkpoint(

@@ -19,28 +19,19 @@ from harness.objects.builtin import BUILTIN, DESCRIPTION
 
 @dataclass(frozen=True, eq=False)
 class PartRequest:
-    """What is to be built of an object.
-
-    Attributes:
-        mesh: a file of a surface, with its colours for a look, or of tetrahedra for a sound; or
-            ``builtin:`` and a name.
-        material: of all of it; only sound asks, an ObjectFile says.
-        profile: of the part's profiles.
-        units: of the file's numbers; None to take the only ones that make sense.
-        wall: m, of a hollow thing of which the file has the outside; a picture is of the file's faces.
-        licence: of the mesh, and so of the ObjectFile.
-        seed: of everything random.
-        up_axis: axis of the file that points up; None for the one that it declares, else z.
-    """
+    """What is to be built of an object."""
 
     mesh: str
-    material: Material
-    profile: str = "standard"
-    units: str | None = None
+    """a file of a surface, with its colours for a look, or of tetrahedra for a sound; or ``builtin:`` and a
+    name."""
+    material: Material  #: of all of it; only sound asks, an ObjectFile says.
+    profile: str = "standard"  #: of the part's profiles.
+    units: str | None = None  #: of the file's numbers; None to take the only ones that make sense.
     wall: float | None = None
-    licence: str = "unknown"
-    seed: int = 0
-    up_axis: str | None = None
+    """m, of a hollow thing of which the file has the outside; a picture is of the file's faces."""
+    licence: str = "unknown"  #: of the mesh, and so of the ObjectFile.
+    seed: int = 0  #: of everything random.
+    up_axis: str | None = None  #: axis of the file that points up; None for the one that it declares, else z.
 
 
 def provenance_of(

@@ -51,14 +51,10 @@ def train(training: Resumable, epochs: int, checkpoint: Path, report: Report) ->
 
 
 class Laps:
-    """Seconds on the clock of parts that follow each other.
-
-    Attributes:
-        seconds: of each part.
-    """
+    """Seconds on the clock of parts that follow each other."""
 
     def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
+        self.seconds: dict[str, float] = {}  #: of each part.
         self._since = time.perf_counter()
 
     def lap(self, part: str) -> None:

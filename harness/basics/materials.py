@@ -16,24 +16,16 @@ class Material:
     """An isotropic elastic solid with Rayleigh damping.
 
     A mode of angular frequency w decays as exp(-d t) with d = (alpha + beta w^2) / 2.
-
-    Attributes:
-        name: as a scene writes it.
-        density: kg/m^3.
-        young: Pa, Young's modulus.
-        poisson: Poisson's ratio.
-        alpha: 1/s, mass-proportional damping.
-        beta: s, stiffness-proportional damping.
     """
 
     key_name: ClassVar[str] = "harness.basics.materials.Material"
 
-    name: str
-    density: float
-    young: float
-    poisson: float
-    alpha: float
-    beta: float
+    name: str  #: as a scene writes it.
+    density: float  #: kg/m^3.
+    young: float  #: Pa, Young's modulus.
+    poisson: float  #: Poisson's ratio.
+    alpha: float  #: 1/s, mass-proportional damping.
+    beta: float  #: s, stiffness-proportional damping.
 
     @property
     def speed(self) -> float:
@@ -43,21 +35,13 @@ class Material:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """How far an object may be from its material's constants: deviations (1 sigma) of natural logarithms.
+    """How far an object may be from its material's constants: deviations (1 sigma) of natural logarithms."""
 
-    Attributes:
-        density: 0.05 for five per cent, as all others.
-        young: of Young's modulus.
-        poisson: of Poisson's ratio.
-        alpha: of the mass-proportional damping.
-        beta: of the stiffness-proportional damping.
-    """
-
-    density: float
-    young: float
-    poisson: float
-    alpha: float
-    beta: float
+    density: float  #: 0.05 for five per cent, as all others.
+    young: float  #: of Young's modulus.
+    poisson: float  #: of Poisson's ratio.
+    alpha: float  #: of the mass-proportional damping.
+    beta: float  #: of the stiffness-proportional damping.
 
     @property
     def speed(self) -> float:
@@ -67,19 +51,12 @@ class Uncertainty:
 
 @dataclass(frozen=True)
 class KnownMaterial:
-    """A material and what its numbers rest on.
+    """A material and what its numbers rest on."""
 
-    Attributes:
-        material: its constants.
-        source: of the constants.
-        uncertainty: of an object said to be of it.
-        basis: of the uncertainty.
-    """
-
-    material: Material
-    source: str
-    uncertainty: Uncertainty
-    basis: str
+    material: Material  #: its constants.
+    source: str  #: of the constants.
+    uncertainty: Uncertainty  #: of an object said to be of it.
+    basis: str  #: of the uncertainty.
 
 
 _KLEINPAT = (

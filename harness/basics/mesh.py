@@ -11,17 +11,12 @@ from harness.basics.arrays import FloatArray, IntArray, read_only
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles with shared vertices, outward by the right-hand rule.
-
-    Attributes:
-        vertices: ``(n, 3)`` metres, in the object's frame.
-        faces: ``(m, 3)`` indices into the vertices.
-    """
+    """Triangles with shared vertices, outward by the right-hand rule."""
 
     key_name: ClassVar[str] = "harness.basics.mesh.Mesh"
 
-    vertices: FloatArray
-    faces: IntArray
+    vertices: FloatArray  #: ``(n, 3)`` metres, in the object's frame.
+    faces: IntArray  #: ``(m, 3)`` indices into the vertices.
 
     def __post_init__(self) -> None:
         vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)

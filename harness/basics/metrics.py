@@ -12,17 +12,11 @@ RESAMPLES = 2000
 
 @dataclass(frozen=True)
 class Interval:
-    """A statistic with its 90 % bootstrap interval (Efron, 1979; percentile form).
+    """A statistic with its 90 % bootstrap interval (Efron, 1979; percentile form)."""
 
-    Attributes:
-        value: of the sample itself.
-        low: 5th percentile over resamples.
-        high: 95th percentile.
-    """
-
-    value: float
-    low: float
-    high: float
+    value: float  #: of the sample itself.
+    low: float  #: 5th percentile over resamples.
+    high: float  #: 95th percentile.
 
 
 def bootstrap(values: FloatArray, statistic: Callable[[FloatArray], FloatArray], seed: int = 0) -> Interval:

@@ -21,16 +21,12 @@ class Dimension:
 
     ``Annotated[float, LENGTH]`` is a pydantic field that reads text with a unit and holds the
     SI value; as JSON it is text again.
-
-    Attributes:
-        name: with its article, as messages say it.
-        factors: SI units in one of each unit, as decimal text; the first unit is the SI one.
-        example: as an operator would write it.
     """
 
-    name: str
+    name: str  #: with its article, as messages say it.
     factors: Mapping[str, str]
-    example: str
+    """SI units in one of each unit, as decimal text; the first unit is the SI one."""
+    example: str  #: as an operator would write it.
 
     @property
     def si(self) -> str:

@@ -24,21 +24,13 @@ _DRIFT = 0.002
 
 @dataclass(frozen=True)
 class RestLine:
-    """A straight line through the rest next to an event.
+    """A straight line through the rest next to an event."""
 
-    Attributes:
-        level: rest at ``time``, in the unit of the signal.
-        slope: drift per s.
-        time: s from the first sample.
-        noise: standard deviation of a sample about the line.
-        covariance: ``(2, 2)`` of ``level`` and ``slope`` for samples of deviation one.
-    """
-
-    level: float
-    slope: float
-    time: float
-    noise: float
-    covariance: FloatArray
+    level: float  #: rest at ``time``, in the unit of the signal.
+    slope: float  #: drift per s.
+    time: float  #: s from the first sample.
+    noise: float  #: standard deviation of a sample about the line.
+    covariance: FloatArray  #: ``(2, 2)`` of ``level`` and ``slope`` for samples of deviation one.
 
     def at(self, times: FloatArray) -> FloatArray:
         """Return the rest level at ``times``, in s from the first sample."""

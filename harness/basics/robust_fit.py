@@ -24,20 +24,14 @@ _SETTLED = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class RobustFit:
-    """Values of a linear model.
+    """Values of a linear model."""
 
-    Attributes:
-        values: ``(values,)``.
-        moved: ``(blocks, values)`` how far each block's points pull the values; the root of the sum of their
-            squares is the standard error, but for ``blocks / (blocks - 1)`` under the root.
-        scale: robust standard deviation of what is left.
-        outliers: share of the points that have no weight.
-    """
-
-    values: FloatArray
+    values: FloatArray  #: ``(values,)``.
     moved: FloatArray
-    scale: float
-    outliers: float
+    """``(blocks, values)`` how far each block's points pull the values; the root of the sum of their squares
+    is the standard error, but for ``blocks / (blocks - 1)`` under the root."""
+    scale: float  #: robust standard deviation of what is left.
+    outliers: float  #: share of the points that have no weight.
 
     def __post_init__(self) -> None:
         read_only(self.values)

@@ -45,15 +45,10 @@ def default_folder() -> Path:
 
 @dataclass(frozen=True)
 class Store:
-    """A folder of results; any number of processes may share it.
+    """A folder of results; any number of processes may share it."""
 
-    Attributes:
-        folder: made on first use.
-        limit: bytes; the results longest unused are dropped beyond it. None for no limit.
-    """
-
-    folder: Path
-    limit: int | None = None
+    folder: Path  #: made on first use.
+    limit: int | None = None  #: bytes; the results longest unused are dropped beyond it. None for no limit.
 
     def get(self, key: str) -> Storable | None:
         """The result under ``key``; None where there is none, or where it does not read back whole."""

@@ -19,23 +19,15 @@ _ABSOLUTE_TOLERANCE, _RELATIVE_TOLERANCE = 0.5e-3, 0.005
 
 @dataclass(frozen=True, eq=False)
 class SymmetryGroup:
-    """Rotations about one axis, and half turns across it.
+    """Rotations about one axis, and half turns across it."""
 
-    Attributes:
-        centre: ``(3,)`` metres, a point of the axis; half turns across pass through it.
-        axis: ``(3,)`` unit vector.
-        fold: how many steps make a turn; 1 for no symmetry about the axis, 0 for any angle.
-        flip: ``(3,)`` unit vector across the axis, about which a half turn is a symmetry; or None.
-        rms: metres, how far the worst of these rotations moves the surface off itself.
-        tolerance: metres, the most that was allowed.
-    """
-
-    centre: FloatArray
-    axis: FloatArray
-    fold: int
+    centre: FloatArray  #: ``(3,)`` metres, a point of the axis; half turns across pass through it.
+    axis: FloatArray  #: ``(3,)`` unit vector.
+    fold: int  #: how many steps make a turn; 1 for no symmetry about the axis, 0 for any angle.
     flip: FloatArray | None
-    rms: float
-    tolerance: float
+    """``(3,)`` unit vector across the axis, about which a half turn is a symmetry; or None."""
+    rms: float  #: metres, how far the worst of these rotations moves the surface off itself.
+    tolerance: float  #: metres, the most that was allowed.
 
     @property
     def name(self) -> str:

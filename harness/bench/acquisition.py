@@ -40,19 +40,12 @@ _FAR = 6.0
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """All blocks of one channel in a row, and the steady clock that their times give.
+    """All blocks of one channel in a row, and the steady clock that their times give."""
 
-    Attributes:
-        name: of the channel.
-        counts: ``(t,)``, whole.
-        start: s on the bench clock, of the first.
-        rate: Hz on the bench clock.
-    """
-
-    name: str
-    counts: FloatArray
-    start: float
-    rate: float
+    name: str  #: of the channel.
+    counts: FloatArray  #: ``(t,)``, whole.
+    start: float  #: s on the bench clock, of the first.
+    rate: float  #: Hz on the bench clock.
 
     @property
     def end(self) -> float:
@@ -134,49 +127,31 @@ _FULL_SCALES = (2**11 - 1, 2**15 - 1, 2**23 - 1, 2**31 - 1)
 
 @dataclass(frozen=True)
 class AcquisitionCalibration:
-    """What counts mean: a dated artefact of one box with one hammer and one microphone.
+    """What counts mean: a dated artefact of one box with one hammer and one microphone."""
 
-    Attributes:
-        model: of the box, for example ``"DI-2108"``.
-        serial: of the box, as it states it (``info 6``).
-        hammer_serial: of the force cell.
-        microphone_serial: of the microphone.
-        date: ISO 8601, of the calibration.
-        made_from: what it was made from: the certificates, or the recording of a known mass being struck.
-        volts_per_count: V, of the box.
-        full_scale_counts: greatest count that the box can say; ``-full_scale_counts - 1`` is the least.
-        hammer_newtons_per_volt: N/V at the box's input; the cell's sensitivity and its conditioner's gain.
-        hammer_offset: counts at rest.
-        hammer_limit: N, the greatest force of the calibration; beyond it a strike counts as overload.
-        microphone_volts_per_count: V, of the converter that the microphone is on; the box's own if that.
-        microphone_full_scale_counts: of that converter.
-        microphone_pascals_per_volt: Pa/V at the converter's input, sensitivity and gain inside.
-        microphone_offset: counts at rest.
-        microphone_limit: Pa, the greatest pressure of the calibration.
-        offset_tolerance: counts by which a rest may differ from its offset; less than half of the two
-            offsets' difference, or a swap of the channels could not be told. Counts of the box: of a
-            microphone's own converter it is the same share of full scale.
-        residual: relative, of the fit or as the certificates state it.
-    """
-
-    model: str
-    serial: str
-    hammer_serial: str
-    microphone_serial: str
-    date: str
-    made_from: str
-    volts_per_count: float
-    full_scale_counts: int
+    model: str  #: of the box, for example ``"DI-2108"``.
+    serial: str  #: of the box, as it states it (``info 6``).
+    hammer_serial: str  #: of the force cell.
+    microphone_serial: str  #: of the microphone.
+    date: str  #: ISO 8601, of the calibration.
+    made_from: str  #: what it was made from: the certificates, or the recording of a known mass being struck.
+    volts_per_count: float  #: V, of the box.
+    full_scale_counts: int  #: greatest count that the box can say; ``-full_scale_counts - 1`` is the least.
     hammer_newtons_per_volt: float
-    hammer_offset: float
-    hammer_limit: float
+    """N/V at the box's input; the cell's sensitivity and its conditioner's gain."""
+    hammer_offset: float  #: counts at rest.
+    hammer_limit: float  #: N, the greatest force of the calibration; beyond it a strike counts as overload.
     microphone_volts_per_count: float
-    microphone_full_scale_counts: int
-    microphone_pascals_per_volt: float
-    microphone_offset: float
-    microphone_limit: float
+    """V, of the converter that the microphone is on; the box's own if that."""
+    microphone_full_scale_counts: int  #: of that converter.
+    microphone_pascals_per_volt: float  #: Pa/V at the converter's input, sensitivity and gain inside.
+    microphone_offset: float  #: counts at rest.
+    microphone_limit: float  #: Pa, the greatest pressure of the calibration.
     offset_tolerance: float
-    residual: float
+    """counts by which a rest may differ from its offset; less than half of the two offsets' difference, or a
+    swap of the channels could not be told. Counts of the box: of a microphone's own converter it is the same
+    share of full scale."""
+    residual: float  #: relative, of the fit or as the certificates state it.
 
     def __post_init__(self) -> None:
         values = asdict(self)
@@ -258,38 +233,28 @@ def _check_number(name: str, value: object) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Strike:
-    """One captured strike, on one time axis.
+    """One captured strike, on one time axis."""
 
-    Attributes:
-        rate: Hz, of both channels, fitted on the bench clock.
-        force: ``(t,)`` N, compression positive, rest taken off.
-        pressure: ``(t,)`` Pa at the same times as the force, rest taken off; zero where it is ``lost`` and
-            shares no moment with the force.
-        onset: sample at which the force reached the trigger's threshold; 0 where silent.
-        start: s on the bench clock, of sample 0.
-        overload: full scale was read, a channel has flat tops, or the calibrated range was left: amplitudes
-            are not to be trusted.
-            Also where ``lost`` says that the sound is not.
-        double_hit: the hammer touched twice.
-        silent: no force reached the threshold; there is nothing to analyse.
-        lost: why the sound of a microphone on a clock of its own must not be used; empty where it may.
-        jitter: s, standard deviation of the sound's place against the force's, from strike to strike; 0 on
-            one clock. A latency common to all strikes is not in it: see ``opened``.
-        opened: s on the bench clock, when the microphone's own stream was opened; None on one clock. Between
-            strikes of two streams the latency may differ.
-    """
-
-    rate: float
-    force: FloatArray
+    rate: float  #: Hz, of both channels, fitted on the bench clock.
+    force: FloatArray  #: ``(t,)`` N, compression positive, rest taken off.
     pressure: FloatArray
-    onset: int
-    start: float
+    """``(t,)`` Pa at the same times as the force, rest taken off; zero where it is ``lost`` and shares no
+    moment with the force."""
+    onset: int  #: sample at which the force reached the trigger's threshold; 0 where silent.
+    start: float  #: s on the bench clock, of sample 0.
     overload: bool
-    double_hit: bool
-    silent: bool
+    """full scale was read, a channel has flat tops, or the calibrated range was left: amplitudes are not to
+    be trusted. Also where ``lost`` says that the sound is not."""
+    double_hit: bool  #: the hammer touched twice.
+    silent: bool  #: no force reached the threshold; there is nothing to analyse.
     lost: str = ""
+    """why the sound of a microphone on a clock of its own must not be used; empty where it may."""
     jitter: float = 0.0
+    """s, standard deviation of the sound's place against the force's, from strike to strike; 0 on one clock.
+    A latency common to all strikes is not in it: see ``opened``."""
     opened: float | None = None
+    """s on the bench clock, when the microphone's own stream was opened; None on one clock. Between strikes
+    of two streams the latency may differ."""
 
     @property
     def fault(self) -> str:

@@ -37,17 +37,11 @@ BLOCK = 500
 
 @dataclass(frozen=True)
 class CaptureForm:
-    """What is known of a box besides its counts.
+    """What is known of a box besides its counts."""
 
-    Attributes:
-        nominal_rate: Hz, of each channel.
-        threshold: counts above rest, at which a strike begins.
-        full_scale: greatest count.
-    """
-
-    nominal_rate: float
-    threshold: float
-    full_scale: int
+    nominal_rate: float  #: Hz, of each channel.
+    threshold: float  #: counts above rest, at which a strike begins.
+    full_scale: int  #: greatest count.
 
 
 def block_channel(name: str, block: int, nominal_rate: float) -> Channel:
@@ -57,19 +51,12 @@ def block_channel(name: str, block: int, nominal_rate: float) -> Channel:
 
 @dataclass(frozen=True)
 class Flags:
-    """Whether a strike can be used.
+    """Whether a strike can be used."""
 
-    Attributes:
-        onset: first sample of force at the threshold; 0 where silent.
-        overload: either channel read full scale or has flat tops below it: the true peak is not known.
-        double_hit: the hammer touched twice.
-        silent: the force never reached the threshold.
-    """
-
-    onset: int
-    overload: bool
-    double_hit: bool
-    silent: bool
+    onset: int  #: first sample of force at the threshold; 0 where silent.
+    overload: bool  #: either channel read full scale or has flat tops below it: the true peak is not known.
+    double_hit: bool  #: the hammer touched twice.
+    silent: bool  #: the force never reached the threshold.
 
 
 def readings_of_capture(

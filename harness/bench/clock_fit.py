@@ -21,21 +21,13 @@ _KEPT_BUCKETS = 600
 
 @dataclass(frozen=True, eq=False)
 class ClockFit:
-    """A steady clock of samples.
+    """A steady clock of samples."""
 
-    Attributes:
-        start: s on the bench clock at which sample 0 was taken, plus the least latency.
-        rate: Hz, samples a second of the bench clock.
-        residual: s, median lateness of the arrivals that it was fitted to.
-        samples: ``(n,)`` numbers of the samples that it was fitted to.
-        arrivals: ``(n,)`` s on the bench clock, of those.
-    """
-
-    start: float
-    rate: float
-    residual: float
-    samples: FloatArray
-    arrivals: FloatArray
+    start: float  #: s on the bench clock at which sample 0 was taken, plus the least latency.
+    rate: float  #: Hz, samples a second of the bench clock.
+    residual: float  #: s, median lateness of the arrivals that it was fitted to.
+    samples: FloatArray  #: ``(n,)`` numbers of the samples that it was fitted to.
+    arrivals: FloatArray  #: ``(n,)`` s on the bench clock, of those.
 
     def time(self, sample: float) -> float:
         """Bench-clock seconds at which a sample was taken."""

@@ -14,48 +14,28 @@ from harness.bench.reading import Reading
 
 @dataclass(frozen=True, eq=False)
 class ArmState:
-    """One packet of the arm's stream.
+    """One packet of the arm's stream."""
 
-    Attributes:
-        time: s on the bench clock, at arrival.
-        joints: ``(6,)`` rad, measured.
-        joint_speeds: ``(6,)`` rad/s, measured.
-        base_from_flange: ``(4, 4)``, the controller's own.
-        wrench: ``(6,)`` N and N m at the flange, in base.
-        safety: ``"normal"``, ``"protective stop"``, ``"emergency stop"`` and so on, in words.
-        moving: whether the arm is executing a motion.
-    """
-
-    time: float
-    joints: FloatArray
-    joint_speeds: FloatArray
-    base_from_flange: FloatArray
-    wrench: FloatArray
-    safety: str
-    moving: bool
+    time: float  #: s on the bench clock, at arrival.
+    joints: FloatArray  #: ``(6,)`` rad, measured.
+    joint_speeds: FloatArray  #: ``(6,)`` rad/s, measured.
+    base_from_flange: FloatArray  #: ``(4, 4)``, the controller's own.
+    wrench: FloatArray  #: ``(6,)`` N and N m at the flange, in base.
+    safety: str  #: ``"normal"``, ``"protective stop"``, ``"emergency stop"`` and so on, in words.
+    moving: bool  #: whether the arm is executing a motion.
 
 
 @dataclass(frozen=True)
 class Health:
-    """How an instrument is doing, for ``touchstone check`` and the report.
+    """How an instrument is doing, for ``touchstone check`` and the report."""
 
-    Attributes:
-        name: of the instrument.
-        identity: model and serial number, as the instrument states them.
-        rate: samples a second, measured.
-        drops: samples lost since opening.
-        latency: s, median age of a sample on arrival; None where it cannot be known.
-        detail: anything worth a sentence.
-        failure: why nothing comes from it at present; empty while something does.
-    """
-
-    name: str
-    identity: str
-    rate: float
-    drops: int
-    latency: float | None
-    detail: str = ""
-    failure: str = ""
+    name: str  #: of the instrument.
+    identity: str  #: model and serial number, as the instrument states them.
+    rate: float  #: samples a second, measured.
+    drops: int  #: samples lost since opening.
+    latency: float | None  #: s, median age of a sample on arrival; None where it cannot be known.
+    detail: str = ""  #: anything worth a sentence.
+    failure: str = ""  #: why nothing comes from it at present; empty while something does.
 
 
 class Arm(Protocol):

@@ -14,24 +14,16 @@ from harness.basics.files.named_file import nearest
 
 @dataclass(frozen=True)
 class ExperimentRow:
-    """One experiment or calibration.
+    """One experiment or calibration."""
 
-    Attributes:
-        about: its question, in one line.
-        value: import string of its ``Experiment``; None for a calibration.
-        section: name of its table in a scene file; None where it has none.
-        model: import string of that table's model.
-        tables: import string of the ``Measurement`` that ``touchstone tables`` measures by, with the paper's
-            baselines among its methods; None for the experiment's own.
-        command: the words after ``touchstone`` that read a run of it again.
-    """
-
-    about: str
-    value: str | None = None
-    section: str | None = None
-    model: str | None = None
+    about: str  #: its question, in one line.
+    value: str | None = None  #: import string of its ``Experiment``; None for a calibration.
+    section: str | None = None  #: name of its table in a scene file; None where it has none.
+    model: str | None = None  #: import string of that table's model.
     tables: str | None = None
-    command: str = "replay"
+    """import string of the ``Measurement`` that ``touchstone tables`` measures by, with the paper's baselines
+    among its methods; None for the experiment's own."""
+    command: str = "replay"  #: the words after ``touchstone`` that read a run of it again.
 
 
 EXPERIMENTS: dict[str, ExperimentRow] = {

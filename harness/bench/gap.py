@@ -18,160 +18,102 @@ _FOLDER = Path(__file__).parent / "gaps"
 
 
 class ArmGap(StrictModel):
-    """Where the arm is, against where its controller says.
+    """Where the arm is, against where its controller says."""
 
-    Attributes:
-        translation: m, per axis of the base and contact.
-        along_tool: m, along the tool's axis, per contact, in addition.
-    """
-
-    translation: Annotated[Length, Nonnegative]
-    along_tool: Annotated[Length, Nonnegative]
+    translation: Annotated[Length, Nonnegative]  #: m, per axis of the base and contact.
+    along_tool: Annotated[Length, Nonnegative]  #: m, along the tool's axis, per contact, in addition.
 
 
 class ObjectGap(StrictModel):
-    """How the object stands, against the scene's nominal pose.
-
-    Attributes:
-        position: m, per axis of the base and run; no estimator is told the position.
-        height: m, of the support under it, per run; None for what ``position`` says.
-        yaw: rad, about the vertical, per run.
-        tilt: rad, about base x and y each, per run.
-    """
+    """How the object stands, against the scene's nominal pose."""
 
     position: Annotated[Length, Nonnegative]
-    yaw: Annotated[Angle, Nonnegative]
-    tilt: Annotated[Angle, Nonnegative]
+    """m, per axis of the base and run; no estimator is told the position."""
+    yaw: Annotated[Angle, Nonnegative]  #: rad, about the vertical, per run.
+    tilt: Annotated[Angle, Nonnegative]  #: rad, about base x and y each, per run.
     height: Annotated[Length, Nonnegative] | None = None
+    """m, of the support under it, per run; None for what ``position`` says."""
 
 
 class SensorGap(StrictModel):
-    """How the sensor is mounted, against the station's frame of it.
+    """How the sensor is mounted, against the station's frame of it."""
 
-    Attributes:
-        tilt: rad, about gel x and y each, per run.
-        tilt_per_contact: rad, about gel x and y each, per contact.
-        image_yaw: rad, of the image about the gel's z, per run.
-        gel_centre: m, per axis of the gel's frame, per run.
-        pitch: relative, of the length of gel that a pixel shows, per run.
-        aspect: relative, of a pixel's height against its width, per run.
-        housing: whether the rigid face around the gel stops at the object, or passes through it as if it were
-            not there.
-    """
-
-    tilt: Annotated[Angle, Nonnegative]
-    tilt_per_contact: Annotated[Angle, Nonnegative]
-    image_yaw: Annotated[Angle, Nonnegative]
-    gel_centre: Annotated[Length, Nonnegative]
-    pitch: Annotated[Ratio, Nonnegative] = 0.0
-    aspect: Annotated[Ratio, Nonnegative] = 0.0
+    tilt: Annotated[Angle, Nonnegative]  #: rad, about gel x and y each, per run.
+    tilt_per_contact: Annotated[Angle, Nonnegative]  #: rad, about gel x and y each, per contact.
+    image_yaw: Annotated[Angle, Nonnegative]  #: rad, of the image about the gel's z, per run.
+    gel_centre: Annotated[Length, Nonnegative]  #: m, per axis of the gel's frame, per run.
+    pitch: Annotated[Ratio, Nonnegative] = 0.0  #: relative, of the length of gel that a pixel shows, per run.
+    aspect: Annotated[Ratio, Nonnegative] = 0.0  #: relative, of a pixel's height against its width, per run.
     housing: Literal["rigid", "not there"] = "rigid"
+    """whether the rigid face around the gel stops at the object, or passes through it as if it were not
+    there."""
 
 
 class GelGap(StrictModel):
-    """How the gel deforms and is seen, against its model.
+    """How the gel deforms and is seen, against its model."""
 
-    Attributes:
-        height_gain: relative, of the indentation, per run.
-        height_offset: m of indentation, per contact.
-        pixel_noise: m of indentation, per pixel.
-        shading: m of indentation, smooth over the image, per run.
-        skirt: m, the blur by which the gel hangs from what it touches: the value itself.
-        calibration: whether the world's colours come from presses other than the estimator's.
-    """
-
-    height_gain: Annotated[Ratio, Nonnegative]
-    height_offset: Annotated[Length, Nonnegative]
-    pixel_noise: Annotated[Length, Nonnegative]
-    shading: Annotated[Length, Nonnegative]
+    height_gain: Annotated[Ratio, Nonnegative]  #: relative, of the indentation, per run.
+    height_offset: Annotated[Length, Nonnegative]  #: m of indentation, per contact.
+    pixel_noise: Annotated[Length, Nonnegative]  #: m of indentation, per pixel.
+    shading: Annotated[Length, Nonnegative]  #: m of indentation, smooth over the image, per run.
     skirt: Annotated[Length, Nonnegative]
+    """m, the blur by which the gel hangs from what it touches: the value itself."""
     calibration: Literal["other presses", "the estimator's"]
+    """whether the world's colours come from presses other than the estimator's."""
 
 
 class ShapeGap(StrictModel):
-    """The object as it was made, against its model.
+    """The object as it was made, against its model."""
 
-    Attributes:
-        scale: relative, per run.
-        deviation: m, per axis, smooth, per run.
-        deviation_length: m over which the deviation varies: the value itself.
-    """
-
-    scale: Annotated[Ratio, Nonnegative]
-    deviation: Annotated[Length, Nonnegative]
-    deviation_length: Annotated[Length, Positive]
+    scale: Annotated[Ratio, Nonnegative]  #: relative, per run.
+    deviation: Annotated[Length, Nonnegative]  #: m, per axis, smooth, per run.
+    deviation_length: Annotated[Length, Positive]  #: m over which the deviation varies: the value itself.
 
 
 class SoundGap(StrictModel):
-    """The struck object and what carries its sound, against their models.
-
-    Attributes:
-        wall: relative change of the wall's thickness: uniform between the two.
-        poisson: uniform between minus and plus this.
-        elastic_field: relative, smooth fields of Young's modulus and density.
-        frequency: relative, of all modes together, per run.
-        frequency_per_mode: relative.
-        damping: of the logarithm, of all modes together, per run.
-        damping_per_mode: of the logarithm.
-        microphone_gain: dB, per mode, common to a run, with a random phase.
-        strike_direction: rad, the angle between the blow and the hammer's axis, about an axis drawn
-            uniformly, per strike.
-        strike_point: m, per axis across the hammer and strike.
-        force_gain: relative, per run.
-        pulse: s, the length of the half sine: the value itself.
-        pulse_spread: relative, per strike, uniform between minus and plus this.
-        reverberation_time: s to fall by 60 dB: the value itself; zero without a room.
-        direct_to_reverberant: dB: the value itself.
-        signal_to_noise: dB, of a middling strike over its first half second: the value itself.
-        gain_per_strike: dB, per mode and strike: a microphone, or an object, that moves in between.
-        phase_per_strike: rad, per mode and strike.
-        extra_damping: 1/s on top of every mode's, as of a hand that holds the object: the value itself.
-        silent_strikes: contacts, counted from 0, at which the striker does not reach the object.
-        saturated_strikes: contacts at which the blow is ten times as hard.
-        double_strikes: contacts at which the hammer bounces and hits twice.
-        material: whether stiffness, density and damping are as uncertain as ``harness.basics.materials``
-            says of the object's material, in place of ``frequency`` and ``damping``.
-    """
+    """The struck object and what carries its sound, against their models."""
 
     wall: Annotated[tuple[Ratio, Ratio], Ordered]
-    poisson: float = Field(ge=0.0, lt=0.5)
-    elastic_field: Annotated[Ratio, Nonnegative]
-    frequency: Annotated[Ratio, Nonnegative]
-    frequency_per_mode: Annotated[Ratio, Nonnegative]
-    damping: Annotated[Ratio, Nonnegative]
-    damping_per_mode: Annotated[Ratio, Nonnegative]
-    microphone_gain: Annotated[Level, Nonnegative]
+    """relative change of the wall's thickness: uniform between the two."""
+    poisson: float = Field(ge=0.0, lt=0.5)  #: uniform between minus and plus this.
+    elastic_field: Annotated[Ratio, Nonnegative]  #: relative, smooth fields of Young's modulus and density.
+    frequency: Annotated[Ratio, Nonnegative]  #: relative, of all modes together, per run.
+    frequency_per_mode: Annotated[Ratio, Nonnegative]  #: relative.
+    damping: Annotated[Ratio, Nonnegative]  #: of the logarithm, of all modes together, per run.
+    damping_per_mode: Annotated[Ratio, Nonnegative]  #: of the logarithm.
+    microphone_gain: Annotated[Level, Nonnegative]  #: dB, per mode, common to a run, with a random phase.
     strike_direction: Annotated[Angle, Nonnegative]
-    strike_point: Annotated[Length, Nonnegative]
-    force_gain: Annotated[Ratio, Nonnegative]
-    pulse: Annotated[Time, Positive]
-    pulse_spread: Annotated[Ratio, Nonnegative]
+    """rad, the angle between the blow and the hammer's axis, about an axis drawn uniformly, per strike."""
+    strike_point: Annotated[Length, Nonnegative]  #: m, per axis across the hammer and strike.
+    force_gain: Annotated[Ratio, Nonnegative]  #: relative, per run.
+    pulse: Annotated[Time, Positive]  #: s, the length of the half sine: the value itself.
+    pulse_spread: Annotated[Ratio, Nonnegative]  #: relative, per strike, uniform between minus and plus this.
     reverberation_time: Annotated[Time, Nonnegative]
-    direct_to_reverberant: Level
-    signal_to_noise: Level
+    """s to fall by 60 dB: the value itself; zero without a room."""
+    direct_to_reverberant: Level  #: dB: the value itself.
+    signal_to_noise: Level  #: dB, of a middling strike over its first half second: the value itself.
     gain_per_strike: Annotated[Level, Nonnegative] = 0.0
-    phase_per_strike: Annotated[Angle, Nonnegative] = 0.0
+    """dB, per mode and strike: a microphone, or an object, that moves in between."""
+    phase_per_strike: Annotated[Angle, Nonnegative] = 0.0  #: rad, per mode and strike.
     extra_damping: Annotated[Decay, Nonnegative] = 0.0
+    """1/s on top of every mode's, as of a hand that holds the object: the value itself."""
     silent_strikes: tuple[int, ...] = ()
-    saturated_strikes: tuple[int, ...] = ()
-    double_strikes: tuple[int, ...] = ()
+    """contacts, counted from 0, at which the striker does not reach the object."""
+    saturated_strikes: tuple[int, ...] = ()  #: contacts at which the blow is ten times as hard.
+    double_strikes: tuple[int, ...] = ()  #: contacts at which the hammer bounces and hits twice.
     material: bool = False
+    """whether stiffness, density and damping are as uncertain as ``harness.basics.materials`` says of the
+    object's material, in place of ``frequency`` and ``damping``."""
 
 
 class CameraGap(StrictModel):
-    """Where the scene camera is and what it adds, against the station's description of it.
+    """Where the scene camera is and what it adds, against the station's description of it."""
 
-    Attributes:
-        position: m, per axis of the base, per run.
-        rotation: rad, per axis of the camera, per run.
-        focal_length: relative, per run.
-        noise: grey levels of 255, per pixel, channel and picture.
-    """
-
-    position: Annotated[Length, Nonnegative] = 0.0
-    rotation: Annotated[Angle, Nonnegative] = 0.0
-    focal_length: Annotated[Ratio, Nonnegative] = 0.0
+    position: Annotated[Length, Nonnegative] = 0.0  #: m, per axis of the base, per run.
+    rotation: Annotated[Angle, Nonnegative] = 0.0  #: rad, per axis of the camera, per run.
+    focal_length: Annotated[Ratio, Nonnegative] = 0.0  #: relative, per run.
     noise: float = Field(default=0.0, ge=0.0, allow_inf_nan=False)
+    """grey levels of 255, per pixel, channel and picture."""
 
 
 class Gap(StrictModel):

@@ -51,19 +51,12 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class Take:
-    """What is known of a take by a microphone on a clock of its own.
+    """What is known of a take by a microphone on a clock of its own."""
 
-    Attributes:
-        flags: all that were raised.
-        uncertainty: s, standard deviation of its place on the bench clock, from one strike to another.
-        residual: s, median distance of the blocks from the clock that was fitted to them.
-        opened: s on the bench clock, when the stream was: takes of one stream share an unknown latency.
-    """
-
-    flags: int
-    uncertainty: float
-    residual: float
-    opened: float
+    flags: int  #: all that were raised.
+    uncertainty: float  #: s, standard deviation of its place on the bench clock, from one strike to another.
+    residual: float  #: s, median distance of the blocks from the clock that was fitted to them.
+    opened: float  #: s on the bench clock, when the stream was: takes of one stream share an unknown latency.
 
     @property
     def fault(self) -> str:

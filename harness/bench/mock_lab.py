@@ -39,23 +39,16 @@ _SCHEMA = 1
 
 @dataclass(frozen=True)
 class LabAddresses:
-    """Where the mocked instruments are.
+    """Where the mocked instruments are."""
 
-    Attributes:
-        arm: address of the controller.
-        gel: URL of the stream.
-        camera: URL of the stream, None without.
-        hammer: path of its box's serial port, None where the scene asks for no sound.
-        microphone: name of a sound card's input, None where the hammer's box hears the strikes.
-        environment: what a program must have in its environment to open that input.
-    """
-
-    arm: str
-    gel: str
-    camera: str | None
-    hammer: str | None
+    arm: str  #: address of the controller.
+    gel: str  #: URL of the stream.
+    camera: str | None  #: URL of the stream, None without.
+    hammer: str | None  #: path of its box's serial port, None where the scene asks for no sound.
     microphone: str | None = None
+    """name of a sound card's input, None where the hammer's box hears the strikes."""
     environment: Mapping[str, str] = field(default_factory=dict)
+    """what a program must have in its environment to open that input."""
 
 
 class MockLab:

@@ -30,23 +30,14 @@ _Made = TypeVar("_Made", bound=Instrument)
 
 @dataclass(frozen=True)
 class Instruments:
-    """Those that opened; None where the station has none, the scene needs none, or it did not open.
+    """Those that opened; None where the station has none, the scene needs none, or it did not open."""
 
-    Attributes:
-        arm: which nothing moves.
-        gel: on its flange.
-        camera: that looks on.
-        hammer: that strikes.
-        microphone: with a clock of its own.
-        failures: by name, why one did not open.
-    """
-
-    arm: Arm | None
-    gel: TactileCamera | None
-    camera: TactileCamera | None
-    hammer: ImpactHammer | None
-    microphone: Microphone | None
-    failures: Mapping[str, TouchstoneError]
+    arm: Arm | None  #: which nothing moves.
+    gel: TactileCamera | None  #: on its flange.
+    camera: TactileCamera | None  #: that looks on.
+    hammer: ImpactHammer | None  #: that strikes.
+    microphone: Microphone | None  #: with a clock of its own.
+    failures: Mapping[str, TouchstoneError]  #: by name, why one did not open.
 
 
 def scene_of_all(station: Station, scene: SceneFile | None = None) -> SceneFile:
@@ -138,34 +129,21 @@ _HEARING = 20e-6
 
 @dataclass(frozen=True)
 class RestLevels:
-    """What the hammer's box reads while nothing is struck.
+    """What the hammer's box reads while nothing is struck."""
 
-    Attributes:
-        force_rms_n: N, about its mean.
-        pressure_rms_pa: Pa, about its mean.
-        sound_level_db: of the pressure, over 20 uPa.
-    """
-
-    force_rms_n: float
-    pressure_rms_pa: float
-    sound_level_db: float
+    force_rms_n: float  #: N, about its mean.
+    pressure_rms_pa: float  #: Pa, about its mean.
+    sound_level_db: float  #: of the pressure, over 20 uPa.
 
 
 @dataclass(frozen=True)
 class Checked:
-    """How the instruments of a bench do.
+    """How the instruments of a bench do."""
 
-    Attributes:
-        instruments: those that opened and send something.
-        failures: by name, why the others do not.
-        safety: the arm's; None where the arm did not open.
-        levels: of the hammer's box; None where there is none or it failed.
-    """
-
-    instruments: tuple[Health, ...]
-    failures: Mapping[str, TouchstoneError]
-    safety: str | None
-    levels: RestLevels | None
+    instruments: tuple[Health, ...]  #: those that opened and send something.
+    failures: Mapping[str, TouchstoneError]  #: by name, why the others do not.
+    safety: str | None  #: the arm's; None where the arm did not open.
+    levels: RestLevels | None  #: of the hammer's box; None where there is none or it failed.
 
     def as_json(self) -> dict[str, Any]:
         """For ``--json``."""

@@ -9,40 +9,26 @@ from harness.basics.arrays import AnyArray, FloatArray, read_only
 
 @dataclass(frozen=True)
 class Channel:
-    """What the numbers of a reading mean.
+    """What the numbers of a reading mean."""
 
-    Attributes:
-        name: for example ``"gel.image"`` or ``"arm.joints"``.
-        unit: SI symbol, ``"count"`` for pixels, ``"1"`` for pure numbers.
-        shape: of one sample.
-        dtype: of one sample, as numpy writes it.
-        frame: the frame the numbers are in, or ``""``.
-        nominal_rate: Hz, as the instrument's maker states it; never used to make time stamps.
-    """
-
-    name: str
-    unit: str
-    shape: tuple[int, ...]
-    dtype: str
-    frame: str = ""
+    name: str  #: for example ``"gel.image"`` or ``"arm.joints"``.
+    unit: str  #: SI symbol, ``"count"`` for pixels, ``"1"`` for pure numbers.
+    shape: tuple[int, ...]  #: of one sample.
+    dtype: str  #: of one sample, as numpy writes it.
+    frame: str = ""  #: the frame the numbers are in, or ``""``.
     nominal_rate: float | None = None
+    """Hz, as the instrument's maker states it; never used to make time stamps."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """Samples of one channel with a measured time each.
+    """Samples of one channel with a measured time each."""
 
-    Attributes:
-        channel: what was read.
-        times: ``(n,)`` s on the bench clock, measured on arrival, increasing.
-        values: ``(n, *channel.shape)``, read-only.
-        encoded: the bytes each sample arrived as (JPEG), where there are such; what is recorded.
-    """
-
-    channel: Channel
-    times: FloatArray
-    values: AnyArray
+    channel: Channel  #: what was read.
+    times: FloatArray  #: ``(n,)`` s on the bench clock, measured on arrival, increasing.
+    values: AnyArray  #: ``(n, *channel.shape)``, read-only.
     encoded: tuple[bytes, ...] = field(default=())
+    """the bytes each sample arrived as (JPEG), where there are such; what is recorded."""
 
     def __post_init__(self) -> None:
         times = read_only(np.array(self.times, dtype=np.float64))

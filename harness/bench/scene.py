@@ -47,53 +47,42 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 
 class Pose(StrictModel):
-    """Where the object nominally stands, in the robot's base.
+    """Where the object nominally stands, in the robot's base."""
 
-    Attributes:
-        position: m, of the anchor.
-        yaw: rad, about the vertical.
-        up: axis of the object's frame that points up. In that frame z is up already where the mesh file
-            declares its up axis, or where ``up_axis`` of the object states it.
-        anchor: the point meant by ``position``: the middle of the upright object's bottom (of
-            its bounding box), or the mesh file's origin.
-    """
-
-    position: tuple[Length, Length, Length] = (-0.42, 0.0, 0.25)
-    yaw: Angle = 0.0
+    position: tuple[Length, Length, Length] = (-0.42, 0.0, 0.25)  #: m, of the anchor.
+    yaw: Angle = 0.0  #: rad, about the vertical.
     up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
+    """axis of the object's frame that points up. In that frame z is up already where the mesh file declares
+    its up axis, or where ``up_axis`` of the object states it."""
     anchor: Literal["bottom", "origin"] = "bottom"
+    """the point meant by ``position``: the middle of the upright object's bottom (of its bounding box), or
+    the mesh file's origin."""
 
 
 class SceneObject(StrictModel):
-    """The object under test.
-
-    Attributes:
-        mesh: ``"builtin:mug"`` and so on, or a mesh file; relative to the scene file in the file,
-            absolute once it is read. Left out where the object is that of an ObjectFile, which has its own.
-        units: of the mesh file's numbers; None to go by the file and its size.
-        up_axis: axis of the mesh file that points up: the file is rotated about its origin until that is z,
-            which gives the object's frame; None for the axis that the file declares (glTF, COLLADA), else z.
-        material: a key of ``harness.basics.materials.MATERIALS``; a built-in object has one of its own.
-        scale: applied to the mesh after its units; ``"hidden"`` where nobody is told how large the object was
-            made: models keep the drawing's size, and a mocked world draws another from the run's seed.
-        sizes: m, from and to: the longest side that a hidden size may have; None for half to twice the
-            drawing's, within 5 to 45 cm, what this bench's arm can reach around.
-        wall: m, of an object whose mesh is only its outside; None for what the mesh says.
-        objectfile: folder of its ObjectFile, found as ``mesh`` is, or the name of one that comes with the
-            program; None where it has none. Without ``mesh`` it is the object: its surface, its material and
-            its networks.
-        pose: nominal.
-    """
+    """The object under test."""
 
     mesh: str = Field(min_length=1)
+    """``"builtin:mug"`` and so on, or a mesh file; relative to the scene file in the file, absolute once it
+    is read. Left out where the object is that of an ObjectFile, which has its own."""
     units: Literal["m", "cm", "mm", "um", "in", "ft"] | None = None
+    """of the mesh file's numbers; None to go by the file and its size."""
     up_axis: Literal["x", "y", "z"] | None = None
-    material: str
+    """axis of the mesh file that points up: the file is rotated about its origin until that is z, which gives
+    the object's frame; None for the axis that the file declares (glTF, COLLADA), else z."""
+    material: str  #: a key of ``harness.basics.materials.MATERIALS``; a built-in object has one of its own.
     scale: float | Literal["hidden"] = 1.0
+    """applied to the mesh after its units; ``"hidden"`` where nobody is told how large the object was made:
+    models keep the drawing's size, and a mocked world draws another from the run's seed."""
     sizes: Annotated[tuple[Annotated[Length, Positive], Length], Ordered] | None = None
+    """m, from and to: the longest side that a hidden size may have; None for half to twice the drawing's,
+    within 5 to 45 cm, what this bench's arm can reach around."""
     wall: Annotated[Length, Positive] | None = None
+    """m, of an object whose mesh is only its outside; None for what the mesh says."""
     objectfile: str | None = Field(default=None, min_length=1)
-    pose: Pose = Pose()
+    """folder of its ObjectFile, found as ``mesh`` is, or the name of one that comes with the program; None
+    where it has none. Without ``mesh`` it is the object: its surface, its material and its networks."""
+    pose: Pose = Pose()  #: nominal.
 
     @property
     def builtin(self) -> str | None:
@@ -182,81 +171,52 @@ class SceneObject(StrictModel):
 
 
 class Support(StrictModel):
-    """What holds the object up.
-
-    Attributes:
-        kind: ``"foam"``, a slender pedestal that leaves the object free; ``"clamped"``, a rigid one.
-        width: m, side of the pedestal's square section; its height is from the table to the object.
-    """
+    """What holds the object up."""
 
     kind: Literal["foam", "clamped"] = "foam"
+    """``"foam"``, a slender pedestal that leaves the object free; ``"clamped"``, a rigid one."""
     width: Annotated[Length, Positive] = 0.06
+    """m, side of the pedestal's square section; its height is from the table to the object."""
 
 
 class Table(StrictModel):
-    """The table's plane, horizontal.
+    """The table's plane, horizontal."""
 
-    Attributes:
-        height: m, in base.
-        size: m, along base x and y.
-    """
-
-    height: Length = 0.0
+    height: Length = 0.0  #: m, in base.
     size: tuple[Annotated[Length, Positive], Annotated[Length, Positive]] = (1.6, 1.6)
+    """m, along base x and y."""
 
 
 class Sensors(StrictModel):
-    """Which senses the scene calls for.
+    """Which senses the scene calls for."""
 
-    Attributes:
-        touch: the gel.
-        sound: hammer and microphones.
-        camera: the scene camera.
-        noise: whether simulated readings carry the instruments' own noise.
-    """
-
-    touch: bool = True
-    sound: bool = False
-    camera: bool = False
-    noise: bool = False
+    touch: bool = True  #: the gel.
+    sound: bool = False  #: hammer and microphones.
+    camera: bool = False  #: the scene camera.
+    noise: bool = False  #: whether simulated readings carry the instruments' own noise.
 
 
 class Room(StrictModel):
-    """A room around the bench; without one, the bench stands in the open.
-
-    Attributes:
-        size: m, along base x, y and z.
-        reverberation_time: s for sound to fall by 60 dB.
-        absorption: share of sound energy lost at a wall.
-    """
+    """A room around the bench; without one, the bench stands in the open."""
 
     size: tuple[Annotated[Length, Positive], Annotated[Length, Positive], Annotated[Length, Positive]]
-    reverberation_time: Annotated[Time, Nonnegative] = 0.4
-    absorption: Annotated[Ratio, Nonnegative] | None = None
+    """m, along base x, y and z."""
+    reverberation_time: Annotated[Time, Nonnegative] = 0.4  #: s for sound to fall by 60 dB.
+    absorption: Annotated[Ratio, Nonnegative] | None = None  #: share of sound energy lost at a wall.
 
 
 class Light(StrictModel):
-    """A lamp over the bench, for the scene camera.
+    """A lamp over the bench, for the scene camera."""
 
-    Attributes:
-        position: m, in base.
-        colour: relative red, green and blue.
-    """
-
-    position: tuple[Length, Length, Length]
-    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    position: tuple[Length, Length, Length]  #: m, in base.
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)  #: relative red, green and blue.
 
 
 class Section(StrictModel):
-    """An experiment's own table in a scene file.
+    """An experiment's own table in a scene file."""
 
-    Attributes:
-        table: its name there.
-        seed: of everything that the experiment draws; a run may say another.
-    """
-
-    table: ClassVar[str]
-    seed: int = Field(default=0, ge=0)
+    table: ClassVar[str]  #: its name there.
+    seed: int = Field(default=0, ge=0)  #: of everything that the experiment draws; a run may say another.
 
 
 S = TypeVar("S", bound=Section)
@@ -265,29 +225,18 @@ S = TypeVar("S", bound=Section)
 class SceneFile(StrictModel):
     """A scene. Every table but ``[object]`` may be left out.
 
-    Attributes:
-        schema_number: ``schema`` in the file.
-        title: one line for reports.
-        object: under test.
-        support: under the object.
-        table: under the support.
-        sensors: that the scene calls for.
-        room: None in the open.
-        lights: for the scene camera; none means that no light is simulated.
-        observe: the quantities that a comparison asks the simulation for.
-
     A file may hold the tables of experiments too, each checked by its own model; ``section`` gives one.
     """
 
-    schema_number: Literal[1] = Field(alias="schema")
-    title: str = ""
-    object: SceneObject
-    support: Support = Support()
-    table: Table = Table()
-    sensors: Sensors = Sensors()
-    room: Room | None = None
-    lights: tuple[Light, ...] = ()
-    observe: tuple[str, ...] = ("touch.image",)
+    schema_number: Literal[1] = Field(alias="schema")  #: ``schema`` in the file.
+    title: str = ""  #: one line for reports.
+    object: SceneObject  #: under test.
+    support: Support = Support()  #: under the object.
+    table: Table = Table()  #: under the support.
+    sensors: Sensors = Sensors()  #: that the scene calls for.
+    room: Room | None = None  #: None in the open.
+    lights: tuple[Light, ...] = ()  #: for the scene camera; none means that no light is simulated.
+    observe: tuple[str, ...] = ("touch.image",)  #: the quantities that a comparison asks the simulation for.
 
     def section(self, model: type[S]) -> S:
         """An experiment's table; its defaults where the file has none."""

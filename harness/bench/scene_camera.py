@@ -26,15 +26,10 @@ _NO_CAMERA = "the station {!r} has no [camera]; describe it in the station file"
 
 @dataclass(frozen=True, eq=False)
 class Lamp:
-    """A lamp of the scene.
+    """A lamp of the scene."""
 
-    Attributes:
-        light: of white, as far away as makes no difference.
-        colour: ``(3,)`` of it, relative red, green and blue.
-    """
-
-    light: DirectionalLight
-    colour: FloatArray
+    light: DirectionalLight  #: of white, as far away as makes no difference.
+    colour: FloatArray  #: ``(3,)`` of it, relative red, green and blue.
 
 
 def scene_pinhole(station: Station, scene: SceneFile, mesh: Mesh) -> Pinhole:

@@ -20,15 +20,11 @@ Count = Annotated[int, Field(gt=0)]
 
 
 class Sourced(StrictModel):
-    """A figure of a description and how it is known.
-
-    Attributes:
-        basis: measured on such a sensor, published by somebody, or assumed until measured.
-        source: where, or why.
-    """
+    """A figure of a description and how it is known."""
 
     basis: Literal["measured", "published", "assumed"]
-    source: Annotated[str, Field(min_length=10)]
+    """measured on such a sensor, published by somebody, or assumed until measured."""
+    source: Annotated[str, Field(min_length=10)]  #: where, or why.
 
 
 class ImageFigure(Sourced):
@@ -67,33 +63,21 @@ class ShadowStatement(Sourced):
 
 
 class SensorFile(StrictModel):
-    """A description: see ``TactileSensor``. A flat gel has no radius, a plain one no dots.
+    """A description: see ``TactileSensor``. A flat gel has no radius, a plain one no dots."""
 
-    Attributes:
-        schema_version: ``schema`` in the file.
-        name: of the make.
-        calibration: of its colours, a path beside this file or the name of a shipped one; None without.
-        world_calibration: the same of other presses, which a mocked world shows; None without.
-        image: of the camera.
-        pitch: of a pixel.
-        gel_thickness: of the gel.
-        gel_radius: of a dome.
-        housing: around the gel.
-        markers: on the gel.
-        shadow: in its light.
-    """
-
-    schema_version: Literal[1] = Field(alias="schema")
-    name: Annotated[str, Field(min_length=1)]
+    schema_version: Literal[1] = Field(alias="schema")  #: ``schema`` in the file.
+    name: Annotated[str, Field(min_length=1)]  #: of the make.
     calibration: str | None = None
+    """of its colours, a path beside this file or the name of a shipped one; None without."""
     world_calibration: str | None = None
-    image: ImageFigure
-    pitch: LengthFigure
-    gel_thickness: LengthFigure
-    gel_radius: LengthFigure | None = None
-    housing: HousingFigure
-    markers: MarkerFigure | None = None
-    shadow: ShadowStatement
+    """the same of other presses, which a mocked world shows; None without."""
+    image: ImageFigure  #: of the camera.
+    pitch: LengthFigure  #: of a pixel.
+    gel_thickness: LengthFigure  #: of the gel.
+    gel_radius: LengthFigure | None = None  #: of a dome.
+    housing: HousingFigure  #: around the gel.
+    markers: MarkerFigure | None = None  #: on the gel.
+    shadow: ShadowStatement  #: in its light.
 
 
 _SHIPPED = Path(__file__).parent / "sensors"
@@ -103,21 +87,14 @@ DEFAULT_MAKE = "gelsight-r1.5"
 
 @dataclass(frozen=True)
 class MarkerGrid:
-    """Printed dots on the gel: count, spacing and radius.
-
-    Attributes:
-        rows: dots along the image's rows (downwards).
-        columns: dots along the image's columns.
-        spacing: metres between neighbours.
-        radius: metres.
-    """
+    """Printed dots on the gel: count, spacing and radius."""
 
     key_name: ClassVar[str] = "harness.bench.sensor.MarkerGrid"
 
-    rows: int
-    columns: int
-    spacing: float
-    radius: float
+    rows: int  #: dots along the image's rows (downwards).
+    columns: int  #: dots along the image's columns.
+    spacing: float  #: metres between neighbours.
+    radius: float  #: metres.
 
 
 @dataclass(frozen=True)
@@ -128,30 +105,20 @@ class TactileSensor:
     the sensor towards the object, x along image columns, y along image rows. Pixel
     (row i, column j) has its centre at x = (j + 0.5 - columns / 2) * pitch,
     y = (i + 0.5 - rows / 2) * pitch.
-
-    Attributes:
-        name: of the make.
-        rows: pixels.
-        columns: pixels.
-        pitch: metres a pixel.
-        gel_thickness: metres; no press may be deeper.
-        gel_radius: metres, of a dome that bulges towards the object; None for a flat gel.
-        housing: metres (x, y): full size of the flat face around the gel.
-        markers: the dots printed on the gel, None where there are none.
-        casts_shadow: whether a grazing light makes shadows worth simulating.
     """
 
     key_name: ClassVar[str] = "harness.bench.sensor.TactileSensor"
 
-    name: str
-    rows: int
-    columns: int
-    pitch: float
-    gel_thickness: float
-    gel_radius: float | None = None
+    name: str  #: of the make.
+    rows: int  #: pixels.
+    columns: int  #: pixels.
+    pitch: float  #: metres a pixel.
+    gel_thickness: float  #: metres; no press may be deeper.
+    gel_radius: float | None = None  #: metres, of a dome that bulges towards the object; None for a flat gel.
     housing: tuple[float, float] = (0.034, 0.030)
-    markers: MarkerGrid | None = None
-    casts_shadow: bool = False
+    """metres (x, y): full size of the flat face around the gel."""
+    markers: MarkerGrid | None = None  #: the dots printed on the gel, None where there are none.
+    casts_shadow: bool = False  #: whether a grazing light makes shadows worth simulating.
 
     @property
     def window(self) -> tuple[float, float]:
@@ -161,22 +128,16 @@ class TactileSensor:
 
 @dataclass(frozen=True)
 class SensorDescription:
-    """A make of tactile camera, and how well its figures are known.
+    """A make of tactile camera, and how well its figures are known."""
 
-    Attributes:
-        sensor: for the simulators and the inverse.
-        calibration: of its colours: an absolute path or the name of a shipped one; None where none comes
-            with it.
-        world_calibration: the same of other presses, for the mocked world; None where there are none.
-        sources: of every figure, by its table in the file.
-        assumed: the tables whose figures are nobody's measurement: measure them before they matter.
-    """
-
-    sensor: TactileSensor
+    sensor: TactileSensor  #: for the simulators and the inverse.
     calibration: str | None
+    """of its colours: an absolute path or the name of a shipped one; None where none comes with it."""
     world_calibration: str | None
-    sources: dict[str, str]
+    """the same of other presses, for the mocked world; None where there are none."""
+    sources: dict[str, str]  #: of every figure, by its table in the file.
     assumed: tuple[str, ...]
+    """the tables whose figures are nobody's measurement: measure them before they matter."""
 
 
 def shipped_sensors() -> tuple[str, ...]:

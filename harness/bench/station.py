@@ -55,51 +55,32 @@ def _ignore_mark(step: int, sample: int) -> None:
 
 @dataclass(frozen=True)
 class Bench:
-    """Instruments, open, and what is known of how they are mounted.
+    """Instruments, open, and what is known of how they are mounted."""
 
-    Attributes:
-        arm: that moves.
-        gel: on its flange.
-        camera: that looks on; None without.
-        hammer: that strikes; None where the scene asks for no sound.
-        station: they belong to.
-        mark: see ``Mark``.
-        pause: waits for so many seconds of the bench's own time.
-        lab: behind a mocked bench, for cueing faults; None at a real one.
-        microphone: that hears the strikes on a clock of its own; None where the hammer's box hears them.
-        simulated_clock: returns s of simulated time, by which readings are stamped; None where the readings
-            are stamped by the system's monotonic clock.
-    """
-
-    arm: Arm
-    gel: TactileCamera
-    camera: TactileCamera | None
-    station: Station
-    hammer: ImpactHammer | None = None
-    mark: Mark = _ignore_mark
-    pause: Callable[[float], None] = time.sleep
-    lab: MockLab | None = None
+    arm: Arm  #: that moves.
+    gel: TactileCamera  #: on its flange.
+    camera: TactileCamera | None  #: that looks on; None without.
+    station: Station  #: they belong to.
+    hammer: ImpactHammer | None = None  #: that strikes; None where the scene asks for no sound.
+    mark: Mark = _ignore_mark  #: see ``Mark``.
+    pause: Callable[[float], None] = time.sleep  #: waits for so many seconds of the bench's own time.
+    lab: MockLab | None = None  #: behind a mocked bench, for cueing faults; None at a real one.
     microphone: Microphone | None = None
+    """that hears the strikes on a clock of its own; None where the hammer's box hears them."""
     simulated_clock: Callable[[], float] | None = None
+    """returns s of simulated time, by which readings are stamped; None where the readings are stamped by the
+    system's monotonic clock."""
 
 
 @dataclass(frozen=True)
 class RunContext:
-    """What a mocked bench must know of the run it is opened for.
+    """What a mocked bench must know of the run it is opened for."""
 
-    Attributes:
-        truth: where the world writes what is true.
-        mesh: of the object, in metres, as the run is planned with.
-        seed: of the world.
-        gap: reality gap by name or path; None for the station's own.
-        run_id: identity of the run, which the truth repeats; empty where no run is recorded.
-    """
-
-    truth: Path
-    mesh: Mesh
-    seed: int = 0
-    gap: str | None = None
-    run_id: str = ""
+    truth: Path  #: where the world writes what is true.
+    mesh: Mesh  #: of the object, in metres, as the run is planned with.
+    seed: int = 0  #: of the world.
+    gap: str | None = None  #: reality gap by name or path; None for the station's own.
+    run_id: str = ""  #: identity of the run, which the truth repeats; empty where no run is recorded.
 
 
 @contextmanager

@@ -23,53 +23,32 @@ from harness.bench.station_sections import (
 
 
 class Frames(StrictModel):
-    """What the flange carries, and where.
+    """What the flange carries, and where."""
 
-    Attributes:
-        flange_from_gel: the gel, z out of it.
-        flange_from_hammer: the striker's tip at rest, z along the strike; None without a hammer.
-    """
-
-    flange_from_gel: Placement
+    flange_from_gel: Placement  #: the gel, z out of it.
     flange_from_hammer: Placement | None = None
+    """the striker's tip at rest, z along the strike; None without a hammer."""
 
 
 class MockSection(StrictModel):
-    """The bench is mocked: the far ends of its cables are started with the station.
+    """The bench is mocked: the far ends of its cables are started with the station."""
 
-    Attributes:
-        gap: reality gap, by name or path, where the run does not say another.
-    """
-
-    gap: str = "default"
+    gap: str = "default"  #: reality gap, by name or path, where the run does not say another.
 
 
 class Station(StrictModel):
-    """A bench.
+    """A bench."""
 
-    Attributes:
-        schema_number: ``schema`` in the file.
-        title: one line for reports.
-        arm: of the bench.
-        gel: on its flange.
-        camera: that looks at the bench, None without.
-        hammer: on its flange, None without.
-        microphone: that hears the strikes, None without.
-        frames: what the flange carries.
-        errors: how far the bench may be from what station and scene state.
-        mock: present if the bench is a mocked one.
-    """
-
-    schema_number: Literal[1] = Field(alias="schema")
-    title: str = ""
-    arm: ArmSection
-    gel: GelSection
-    camera: CameraSection | None = None
-    hammer: HammerSection | None = None
-    microphone: MicrophoneSection | None = None
-    frames: Frames
-    errors: BenchErrors = USUAL
-    mock: MockSection | None = None
+    schema_number: Literal[1] = Field(alias="schema")  #: ``schema`` in the file.
+    title: str = ""  #: one line for reports.
+    arm: ArmSection  #: of the bench.
+    gel: GelSection  #: on its flange.
+    camera: CameraSection | None = None  #: that looks at the bench, None without.
+    hammer: HammerSection | None = None  #: on its flange, None without.
+    microphone: MicrophoneSection | None = None  #: that hears the strikes, None without.
+    frames: Frames  #: what the flange carries.
+    errors: BenchErrors = USUAL  #: how far the bench may be from what station and scene state.
+    mock: MockSection | None = None  #: present if the bench is a mocked one.
 
     @property
     def flange_from_gel(self) -> FloatArray:

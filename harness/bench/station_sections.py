@@ -66,15 +66,11 @@ SixAngles = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
 
 
 class Placement(StrictModel):
-    """A frame in another.
+    """A frame in another."""
 
-    Attributes:
-        position: m, of its origin.
-        rotation: rad, the rotation vector: the axis times the angle.
-    """
-
-    position: Three = (0.0, 0.0, 0.0)
+    position: Three = (0.0, 0.0, 0.0)  #: m, of its origin.
     rotation: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
+    """rad, the rotation vector: the axis times the angle."""
 
     @property
     def matrix(self) -> FloatArray:
@@ -83,41 +79,24 @@ class Placement(StrictModel):
 
 
 class SafetySection(StrictModel):
-    """What the arm may be asked to do; nothing outside is ever sent. SI, as ``drivers.ur.safety`` names them.
+    """Limits of the arm; a command outside them is never sent. SI, as ``drivers.ur.safety`` names them."""
 
-    Attributes:
-        workspace_low: m, in base: the corner of the box that every point of the tool stays in.
-        workspace_high: m, in base: the opposite corner.
-        joint_low: rad.
-        joint_high: rad.
-        joint_step: rad, the most that a joint may turn in one motion.
-        joint_speed: rad/s.
-        joint_acceleration: rad/s^2.
-        speed: m/s of any point of the tool, away from contact.
-        speed_near: m/s while seeking contact and within ``near`` of it.
-        near: m of travel around the last contact.
-        acceleration: m/s^2.
-        travel: m, the longest search for contact.
-        force_press: N; a press beyond this is stopped.
-        force_any: N; beyond this the arm is stopped and stays stopped.
-        patience: s that the controller's watchdog waits for this computer before it stops the arm.
-    """
-
-    workspace_low: Three
-    workspace_high: Three
-    joint_low: SixAngles = (-_TURN,) * 6
-    joint_high: SixAngles = (_TURN,) * 6
-    joint_step: Annotated[Angle, Positive] = np.pi
-    joint_speed: Annotated[AngularSpeed, Positive] = 1.5
-    joint_acceleration: Annotated[AngularAcceleration, Positive] = 2.0
-    speed: Annotated[Speed, Positive] = 0.25
-    speed_near: Annotated[Speed, Positive] = 0.05
-    near: Annotated[Length, Positive] = 0.01
-    acceleration: Annotated[Acceleration, Positive] = 1.5
-    travel: Annotated[Length, Positive] = 0.2
-    force_press: Annotated[Force, Positive] = 10.0
-    force_any: Annotated[Force, Positive] = 25.0
+    workspace_low: Three  #: m, in base: the corner of the box that every point of the tool stays in.
+    workspace_high: Three  #: m, in base: the opposite corner.
+    joint_low: SixAngles = (-_TURN,) * 6  #: rad.
+    joint_high: SixAngles = (_TURN,) * 6  #: rad.
+    joint_step: Annotated[Angle, Positive] = np.pi  #: rad, the most that a joint may turn in one motion.
+    joint_speed: Annotated[AngularSpeed, Positive] = 1.5  #: rad/s.
+    joint_acceleration: Annotated[AngularAcceleration, Positive] = 2.0  #: rad/s^2.
+    speed: Annotated[Speed, Positive] = 0.25  #: m/s of any point of the tool, away from contact.
+    speed_near: Annotated[Speed, Positive] = 0.05  #: m/s while seeking contact and within ``near`` of it.
+    near: Annotated[Length, Positive] = 0.01  #: m of travel around the last contact.
+    acceleration: Annotated[Acceleration, Positive] = 1.5  #: m/s^2.
+    travel: Annotated[Length, Positive] = 0.2  #: m, the longest search for contact.
+    force_press: Annotated[Force, Positive] = 10.0  #: N; a press beyond this is stopped.
+    force_any: Annotated[Force, Positive] = 25.0  #: N; beyond this the arm is stopped and stays stopped.
     patience: Annotated[Time, Positive] = 0.1
+    """s that the controller's watchdog waits for this computer before it stops the arm."""
 
     @model_validator(mode="after")
     def _not_empty(self) -> Self:
@@ -129,25 +108,16 @@ class SafetySection(StrictModel):
 
 
 class ArmSection(StrictModel):
-    """The arm.
+    """The arm."""
 
-    Attributes:
-        kind: of driver.
-        model: of arm.
-        address: of its control box; None only in a mocked station.
-        serial: of the arm, as its plate says.
-        rate: Hz of the state stream.
-        striker_output: the tool digital output (0 or 1) that fires the hammer's striker; None without one.
-        safety: limits.
-    """
-
-    kind: Literal["ur"] = "ur"
-    model: Literal["ur3e", "ur5e", "ur10e"] = "ur5e"
-    address: str | None = None
-    serial: str = ""
-    rate: Annotated[Frequency, Positive] = 500.0
+    kind: Literal["ur"] = "ur"  #: of driver.
+    model: Literal["ur3e", "ur5e", "ur10e"] = "ur5e"  #: of arm.
+    address: str | None = None  #: of its control box; None only in a mocked station.
+    serial: str = ""  #: of the arm, as its plate says.
+    rate: Annotated[Frequency, Positive] = 500.0  #: Hz of the state stream.
     striker_output: Literal[0, 1] | None = None
-    safety: SafetySection
+    """the tool digital output (0 or 1) that fires the hammer's striker; None without one."""
+    safety: SafetySection  #: limits.
 
 
 class Markers(StrictModel):
@@ -160,29 +130,19 @@ class Markers(StrictModel):
 
 
 class GelSection(StrictModel):
-    """The tactile camera.
+    """The tactile camera."""
 
-    Attributes:
-        kind: of driver.
-        url: of its stream; None only in a mocked station.
-        make: the shipped name of a sensor, or the path of a sensor's file (relative to the station file,
-            absolute once read).
-        serial: of the sensor.
-        calibration: path (relative to the station file, absolute once read) or name of a
-            calibration artefact.
-        casts_shadow: whether its light grazes enough for shadows.
-        markers: printed on its gel; None for those of its make, if it has any.
-        rate: Hz, as its maker states it.
-    """
-
-    kind: Annotated[Literal["gelsight-http"], _KIND] = "gelsight-http"
-    url: HttpAddress = None
+    kind: Annotated[Literal["gelsight-http"], _KIND] = "gelsight-http"  #: of driver.
+    url: HttpAddress = None  #: of its stream; None only in a mocked station.
     make: str = DEFAULT_MAKE
-    serial: str = ""
+    """the shipped name of a sensor, or the path of a sensor's file (relative to the station file, absolute
+    once read)."""
+    serial: str = ""  #: of the sensor.
     calibration: str
-    casts_shadow: bool = False
-    markers: Markers | None = None
-    rate: Annotated[Frequency, Positive] = 25.0
+    """path (relative to the station file, absolute once read) or name of a calibration artefact."""
+    casts_shadow: bool = False  #: whether its light grazes enough for shadows.
+    markers: Markers | None = None  #: printed on its gel; None for those of its make, if it has any.
+    rate: Annotated[Frequency, Positive] = 25.0  #: Hz, as its maker states it.
 
     @property
     def described(self) -> SensorDescription:
@@ -208,30 +168,23 @@ class GelSection(StrictModel):
 
 
 class HammerSection(StrictModel):
-    """The impact hammer: a force cell on a striker, read by a data-acquisition box.
+    """The impact hammer: a force cell on a striker, read by a data-acquisition box."""
 
-    Attributes:
-        kind: of driver.
-        port: the box's serial port; None to find the box by its serial number, and in a mocked station.
-        serial: of the box.
-        model: of the box; it decides resolution and the fastest rate.
-        rate: Hz, samples of each channel.
-        calibration: path (relative to the station file, absolute once read) or name of a
-            calibration artefact: what a count of each channel means.
-        threshold: N at which a strike is noticed.
-        strike: who fires it: the arm's ``striker_output``, or a person who is asked to.
-        stand_off: m between the tip at rest and the surface when the striker is fired.
-    """
-
-    kind: Literal["dataq"] = "dataq"
+    kind: Literal["dataq"] = "dataq"  #: of driver.
     port: str | None = None
-    serial: str = ""
+    """the box's serial port; None to find the box by its serial number, and in a mocked station."""
+    serial: str = ""  #: of the box.
     model: Literal["DI-1110", "DI-2108"] = "DI-2108"
-    rate: Annotated[Frequency, Positive] = 50e3
+    """of the box; it decides resolution and the fastest rate."""
+    rate: Annotated[Frequency, Positive] = 50e3  #: Hz, samples of each channel.
     calibration: str
-    threshold: Annotated[Force, Positive] = 2.0
+    """path (relative to the station file, absolute once read) or name of a calibration artefact: what a count
+    of each channel means."""
+    threshold: Annotated[Force, Positive] = 2.0  #: N at which a strike is noticed.
     strike: Literal["arm", "operator"] = "arm"
+    """who fires it: the arm's ``striker_output``, or a person who is asked to."""
     stand_off: Annotated[Length, Positive] = 6e-3
+    """m between the tip at rest and the surface when the striker is fired."""
 
     @property
     def acquisition(self) -> AcquisitionCalibration:
@@ -249,28 +202,20 @@ class HammerSection(StrictModel):
 
 
 class MicrophoneSection(StrictModel):
-    """The measurement microphone, fixed to the bench.
-
-    Attributes:
-        kind: ``"dataq"``, a channel of the hammer's box, on its clock; ``"portaudio"``, a sound
-            card's input, on a clock of its own. All keys below but ``serial`` are for the latter.
-        serial: of the microphone.
-        device: name of the sound card's input; None for the box, and in a mocked station.
-        rate: Hz, whole; one that the card has itself.
-        channels: inputs that the device has, exactly; None for one.
-        channel: which of them is the microphone, from 0; None for the first.
-        bits: of a count; None for 24.
-        latency: s by which the card's times are late, as measured; the same for all strikes.
-    """
+    """The measurement microphone, fixed to the bench."""
 
     kind: Literal["dataq", "portaudio"] = "dataq"
-    serial: str = ""
-    device: str | None = None
-    rate: Annotated[Frequency, Positive] | None = None
-    channels: int | None = Field(default=None, gt=0)
+    """``"dataq"``, a channel of the hammer's box, on its clock; ``"portaudio"``, a sound card's input, on a
+    clock of its own. All keys below but ``serial`` are for the latter."""
+    serial: str = ""  #: of the microphone.
+    device: str | None = None  #: name of the sound card's input; None for the box, and in a mocked station.
+    rate: Annotated[Frequency, Positive] | None = None  #: Hz, whole; one that the card has itself.
+    channels: int | None = Field(default=None, gt=0)  #: inputs that the device has, exactly; None for one.
     channel: int | None = Field(default=None, ge=0)
-    bits: Literal[24, 32] | None = None
+    """which of them is the microphone, from 0; None for the first."""
+    bits: Literal[24, 32] | None = None  #: of a count; None for 24.
     latency: Time | None = None
+    """s by which the card's times are late, as measured; the same for all strikes."""
 
     @property
     def full_scale(self) -> int:
@@ -295,22 +240,12 @@ class MicrophoneSection(StrictModel):
 
 
 class CameraSection(StrictModel):
-    """The scene camera.
+    """The scene camera."""
 
-    Attributes:
-        kind: of driver.
-        url: of its stream; None only in a mocked station.
-        serial: of the camera.
-        rows: pixels.
-        columns: pixels.
-        focal_length: pixels.
-        base_from_camera: where it looks from (OpenCV: x right, y down, z forward).
-    """
-
-    kind: Annotated[Literal["camera-http"], _KIND] = "camera-http"
-    url: HttpAddress = None
-    serial: str = ""
-    rows: int = Field(default=480, gt=0)
-    columns: int = Field(default=640, gt=0)
-    focal_length: Annotated[Pixels, Positive] = 600.0
-    base_from_camera: Placement
+    kind: Annotated[Literal["camera-http"], _KIND] = "camera-http"  #: of driver.
+    url: HttpAddress = None  #: of its stream; None only in a mocked station.
+    serial: str = ""  #: of the camera.
+    rows: int = Field(default=480, gt=0)  #: pixels.
+    columns: int = Field(default=640, gt=0)  #: pixels.
+    focal_length: Annotated[Pixels, Positive] = 600.0  #: pixels.
+    base_from_camera: Placement  #: where it looks from (OpenCV: x right, y down, z forward).

@@ -25,27 +25,16 @@ LINKS: Final = ("base", "shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2"
 
 @dataclass(frozen=True, eq=False)
 class ArmTable:
-    """One arm model.
+    """One arm model."""
 
-    Attributes:
-        d: m, the offset along each joint's axis.
-        a: m, the length from each joint's axis to the next.
-        masses: ``(6,)`` kg of the moving links.
-        centres: ``(6, 3)`` m, centre of mass of each link in its Denavit-Hartenberg frame.
-        inertias: ``(6, 3, 3)`` kg m^2 about the centre of mass, along the Denavit-Hartenberg axes.
-        joint_range: ``(2, 6)`` rad, least and greatest; the elbow cannot do a whole turn.
-        joint_speeds: ``(6,)`` rad/s.
-        joint_torques: ``(6,)`` N m.
-    """
-
-    d: tuple[float, float, float, float, float, float]
-    a: tuple[float, float, float, float, float, float]
-    masses: FloatArray
-    centres: FloatArray
-    inertias: FloatArray
-    joint_range: FloatArray
-    joint_speeds: FloatArray
-    joint_torques: FloatArray
+    d: tuple[float, float, float, float, float, float]  #: m, the offset along each joint's axis.
+    a: tuple[float, float, float, float, float, float]  #: m, the length from each joint's axis to the next.
+    masses: FloatArray  #: ``(6,)`` kg of the moving links.
+    centres: FloatArray  #: ``(6, 3)`` m, centre of mass of each link in its Denavit-Hartenberg frame.
+    inertias: FloatArray  #: ``(6, 3, 3)`` kg m^2 about the centre of mass, along the Denavit-Hartenberg axes.
+    joint_range: FloatArray  #: ``(2, 6)`` rad, least and greatest; the elbow cannot do a whole turn.
+    joint_speeds: FloatArray  #: ``(6,)`` rad/s.
+    joint_torques: FloatArray  #: ``(6,)`` N m.
 
 
 def arm_table(model: str) -> ArmTable:

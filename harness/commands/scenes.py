@@ -13,29 +13,19 @@ from harness.bench.scene import SceneFile, Section, load_scene, scene_from_json,
 
 @dataclass(frozen=True)
 class SceneOptions:
-    """What a command line says of a scene; None where it says nothing.
+    """What a command line says of a scene; None where it says nothing."""
 
-    Attributes:
-        scene: a file.
-        object: a mesh, a built-in object or an ObjectFile instead.
-        material, units, wall, objectfile, up_axis: of that object.
-        sense: ``"both"``, or senses with commas between.
-        sizes: between which the longest side of an object of unknown size is.
-        keys: of the experiment's table.
-        assignments: the same, as ``KEY=VALUE``.
-    """
-
-    scene: Path | None = None
-    object: str | None = None
-    material: str | None = None
-    units: str | None = None
-    wall: str | None = None
-    objectfile: str | None = None
-    sense: str | None = None
-    sizes: tuple[str, str] | None = None
-    keys: Mapping[str, Any] = field(default_factory=dict)
-    assignments: Sequence[str] = ()
-    up_axis: str | None = None
+    scene: Path | None = None  #: a file.
+    object: str | None = None  #: a mesh, a built-in object or an ObjectFile instead.
+    material: str | None = None  #: of that object.
+    units: str | None = None  #: of that object.
+    wall: str | None = None  #: of that object.
+    objectfile: str | None = None  #: of that object.
+    sense: str | None = None  #: ``"both"``, or senses with commas between.
+    sizes: tuple[str, str] | None = None  #: between which the longest side of an object of unknown size is.
+    keys: Mapping[str, Any] = field(default_factory=dict)  #: of the experiment's table.
+    assignments: Sequence[str] = ()  #: the same, as ``KEY=VALUE``.
+    up_axis: str | None = None  #: of that object.
 
     @property
     def of_object(self) -> tuple[str | None, ...]:

@@ -126,32 +126,21 @@ _ALIKE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class ObjectLine:
-    """One object's runs at a setting, in logarithms.
+    """One object's runs at a setting, in logarithms."""
 
-    Attributes:
-        work: mean over the runs; 0 where work is not looked at.
-        seconds: mean of the CPU seconds beyond what settings share.
-        rest: ``(runs,)`` what is left of each run's seconds about the line.
-    """
-
-    work: float
-    seconds: float
-    rest: FloatArray
+    work: float  #: mean over the runs; 0 where work is not looked at.
+    seconds: float  #: mean of the CPU seconds beyond what settings share.
+    rest: FloatArray  #: ``(runs,)`` what is left of each run's seconds about the line.
 
 
 @dataclass(frozen=True, eq=False)
 class ParallelLines:
-    """All objects of a setting: parallel lines, one each.
+    """All objects of a setting: parallel lines, one each."""
 
-    Attributes:
-        of: by object.
-        slope: common to all: what a factor of e in work does to the logarithm of the seconds.
-        squares: of the works about their objects' means, summed; 0 where work is not looked at or alike.
-    """
-
-    of: Mapping[str, ObjectLine]
-    slope: float
+    of: Mapping[str, ObjectLine]  #: by object.
+    slope: float  #: common to all: what a factor of e in work does to the logarithm of the seconds.
     squares: float
+    """of the works about their objects' means, summed; 0 where work is not looked at or alike."""
 
     @property
     def pooled(self) -> int:

@@ -17,17 +17,11 @@ from harness.effects.accuracy import Level
 
 @dataclass(frozen=True, eq=False)
 class Budgeted:
-    """What a budget buys.
+    """What a budget buys."""
 
-    Attributes:
-        point: the setting to take.
-        seconds: s on the clock that it takes at most, in nearly every run.
-        fits: whether that is within the budget; else the point is the cheapest there is.
-    """
-
-    point: Point
-    seconds: float
-    fits: bool
+    point: Point  #: the setting to take.
+    seconds: float  #: s on the clock that it takes at most, in nearly every run.
+    fits: bool  #: whether that is within the budget; else the point is the cheapest there is.
 
 
 def for_budget(

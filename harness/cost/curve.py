@@ -24,19 +24,12 @@ GROSS = 20.0e-3
 
 @dataclass(frozen=True)
 class ErrorUnit:
-    """What a program's errors are.
+    """What a program's errors are."""
 
-    Attributes:
-        key: of the unit, where a name has to say it.
-        label: of an error that is drawn.
-        scale: what an error is multiplied by to be shown.
-        gross: errors beyond this are failures, and count alike.
-    """
-
-    key: str
-    label: str
-    scale: float = 1.0
-    gross: float = float("inf")
+    key: str  #: of the unit, where a name has to say it.
+    label: str  #: of an error that is drawn.
+    scale: float = 1.0  #: what an error is multiplied by to be shown.
+    gross: float = float("inf")  #: errors beyond this are failures, and count alike.
 
 
 METRES = ErrorUnit("m", "error in mm (mean, each at most 20 mm; 90 % interval)", 1e3, GROSS)
@@ -44,28 +37,18 @@ METRES = ErrorUnit("m", "error in mm (mean, each at most 20 mm; 90 % interval)",
 
 @dataclass(frozen=True)
 class Sample:
-    """One run, answered at one setting.
+    """One run, answered at one setting."""
 
-    Attributes:
-        run: its name; the same readings at every setting.
-        object: what was touched, by a name that two different objects do not share.
-        error: in the point's unit; a refused answer counts as a random one.
-        radius: m, within which the answer itself claims 90 %; None where it claims nothing.
-        shared: s of CPU time for what is done alike at every setting that needs it: reading images.
-        cpu: s of CPU time for the rest.
-        wall: s on the clock for the rest.
-        work: what the run itself showed, before it was answered, of how much there is to do; what it
-            counts is the program's own. None where it was not counted.
-    """
-
-    run: str
-    object: str
-    error: float
-    radius: float | None
-    shared: float
-    cpu: float
-    wall: float
+    run: str  #: its name; the same readings at every setting.
+    object: str  #: what was touched, by a name that two different objects do not share.
+    error: float  #: in the point's unit; a refused answer counts as a random one.
+    radius: float | None  #: m, within which the answer itself claims 90 %; None where it claims nothing.
+    shared: float  #: s of CPU time for what is done alike at every setting that needs it: reading images.
+    cpu: float  #: s of CPU time for the rest.
+    wall: float  #: s on the clock for the rest.
     work: float | None = None
+    """what the run itself showed, before it was answered, of how much there is to do; what it counts is the
+    program's own. None where it was not counted."""
 
     def __post_init__(self) -> None:
         numbers = (self.error, 0.0 if self.radius is None else self.radius, self.shared, self.cpu, self.wall)
@@ -81,21 +64,14 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One setting, measured.
+    """One setting, measured."""
 
-    Attributes:
-        name: for people.
-        levels: of the dials that are turned.
-        condition: what was given and not chosen: how many contacts, whether the yaw was known.
-        samples: at least one, each of another run.
-        unit: of the samples' errors.
-    """
-
-    name: str
-    levels: Mapping[str, Level]
+    name: str  #: for people.
+    levels: Mapping[str, Level]  #: of the dials that are turned.
     condition: Mapping[str, Level]
-    samples: tuple[Sample, ...]
-    unit: ErrorUnit = METRES
+    """what was given and not chosen: how many contacts, whether the yaw was known."""
+    samples: tuple[Sample, ...]  #: at least one, each of another run.
+    unit: ErrorUnit = METRES  #: of the samples' errors.
 
     def __post_init__(self) -> None:
         runs = [sample.run for sample in self.samples]
@@ -137,23 +113,14 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """All settings of a program, with where and with what they were measured.
+    """All settings of a program, with where and with what they were measured."""
 
-    Attributes:
-        program: such as ``"contact-localization"``.
-        points: measured.
-        machine: its description, see ``harness.cost.provenance``.
-        code: its version, likewise.
-        made: ISO time of the last measurement.
-        title: of the page.
-    """
-
-    program: str
-    points: tuple[Point, ...]
-    machine: Mapping[str, str]
-    code: Mapping[str, str]
-    made: str
-    title: str = ""
+    program: str  #: such as ``"contact-localization"``.
+    points: tuple[Point, ...]  #: measured.
+    machine: Mapping[str, str]  #: its description, see ``harness.cost.provenance``.
+    code: Mapping[str, str]  #: its version, likewise.
+    made: str  #: ISO time of the last measurement.
+    title: str = ""  #: of the page.
     notes: tuple[str, ...] = field(default=())
 
     def where(self, condition: Mapping[str, Level]) -> tuple[Point, ...]:

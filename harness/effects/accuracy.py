@@ -26,26 +26,18 @@ LevelT = TypeVar("LevelT", bound=Level, covariant=True)
 
 @dataclass(frozen=True)
 class Knob(Generic[LevelT]):
-    """One dial.
+    """One dial."""
 
-    Attributes:
-        name: of the effect it belongs to, or that and a word more: ``"touch.optics"``.
-        levels: from cheap to exact. Levels that are methods are only roughly ordered; what they
-            cost and what they lose is measured.
-        unit: of a number, ``""`` for a method or a count.
-        kind: whether the levels are numbers or methods.
-        default: where nobody chooses.
-        meaning: what it dials, in a few words.
-        removed: levels that it had, each with what to do instead.
-    """
-
-    name: str
+    name: str  #: of the effect it belongs to, or that and a word more: ``"touch.optics"``.
     levels: tuple[LevelT, ...]
-    unit: str
-    kind: Literal["number", "method"]
-    default: LevelT
-    meaning: str = ""
+    """from cheap to exact. Levels that are methods are only roughly ordered; what they cost and what they
+    lose is measured."""
+    unit: str  #: of a number, ``""`` for a method or a count.
+    kind: Literal["number", "method"]  #: whether the levels are numbers or methods.
+    default: LevelT  #: where nobody chooses.
+    meaning: str = ""  #: what it dials, in a few words.
     removed: Mapping[Level, str] = field(default_factory=dict, compare=False)
+    """levels that it had, each with what to do instead."""
 
     def __post_init__(self) -> None:
         if not self.levels or len(set(self.levels)) != len(self.levels):

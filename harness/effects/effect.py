@@ -17,83 +17,52 @@ Omission = Callable[[Mapping[str, Any]], float]
 
 @dataclass(frozen=True)
 class Facts:
-    """What decides which effects a scene calls for.
+    """What decides which effects a scene calls for."""
 
-    Attributes:
-        scene: on the table.
-        sensor: on the flange.
-    """
-
-    scene: SceneFile
-    sensor: TactileSensor
+    scene: SceneFile  #: on the table.
+    sensor: TactileSensor  #: on the flange.
 
 
 @dataclass(frozen=True)
 class Condition:
-    """When an effect is called for, in code and in words.
+    """When an effect is called for, in code and in words."""
 
-    Attributes:
-        holds: the test.
-        because: what is the case where it holds.
-        otherwise: what is the case where it does not.
-    """
-
-    holds: Callable[[Facts], bool]
-    because: str
-    otherwise: str
+    holds: Callable[[Facts], bool]  #: the test.
+    because: str  #: what is the case where it holds.
+    otherwise: str  #: what is the case where it does not.
 
 
 @dataclass(frozen=True)
 class Implementation:
-    """How one level of an effect's ``choice`` computes the quantity, where it is not as the effect itself.
+    """How one level of an effect's ``choice`` computes the quantity, where it is not as the effect itself."""
 
-    Attributes:
-        needs: quantities it is computed from, in place of the effect's.
-        compute: in place of the effect's.
-        when: the scene has what it is computed from; None for always.
-        knobs: in place of the effect's.
-        version: as of an effect.
-        stored: as of an effect.
-    """
-
-    needs: tuple[str, ...]
-    compute: Compute
-    when: Condition | None = None
-    knobs: tuple[Knob[Level], ...] = ()
-    version: int = 1
-    stored: bool = False
+    needs: tuple[str, ...]  #: quantities it is computed from, in place of the effect's.
+    compute: Compute  #: in place of the effect's.
+    when: Condition | None = None  #: the scene has what it is computed from; None for always.
+    knobs: tuple[Knob[Level], ...] = ()  #: in place of the effect's.
+    version: int = 1  #: as of an effect.
+    stored: bool = False  #: as of an effect.
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One quantity that can be computed from others.
+    """One quantity that can be computed from others."""
 
-    Attributes:
-        provides: the quantity's name.
-        needs: quantities it is computed from: other effects' or sources.
-        compute: pure; every array it takes and gives has a leading batch axis.
-        when: the scene calls for it; None for always.
-        bypass: the quantity that takes its place where the scene does not call for it; None if
-            asking for it is then an error.
-        knobs: that its levels are chosen by.
-        version: raised with every change of what it computes, so that stored results are dropped.
-        stored: whether a result is worth keeping on disk.
-        omission: an estimate of what leaving it out would change, where there is a cheap one.
-        choice: of ways to compute it; None where there is one.
-        ways: by the levels of ``choice``; the effect's own is for the levels not named here.
-    """
-
-    provides: str
-    needs: tuple[str, ...]
-    compute: Compute
-    when: Condition | None = None
+    provides: str  #: the quantity's name.
+    needs: tuple[str, ...]  #: quantities it is computed from: other effects' or sources.
+    compute: Compute  #: pure; every array it takes and gives has a leading batch axis.
+    when: Condition | None = None  #: the scene calls for it; None for always.
     bypass: str | None = None
-    knobs: tuple[Knob[Level], ...] = ()
-    version: int = 1
-    stored: bool = False
+    """the quantity that takes its place where the scene does not call for it; None if asking for it is then
+    an error."""
+    knobs: tuple[Knob[Level], ...] = ()  #: that its levels are chosen by.
+    version: int = 1  #: raised with every change of what it computes, so that stored results are dropped.
+    stored: bool = False  #: whether a result is worth keeping on disk.
     omission: Omission | None = None
-    choice: Knob[Level] | None = None
+    """an estimate of what leaving it out would change, where there is a cheap one."""
+    choice: Knob[Level] | None = None  #: of ways to compute it; None where there is one.
     ways: Mapping[Level, Implementation] = field(default_factory=dict, hash=False)
+    """by the levels of ``choice``; the effect's own is for the levels not named here."""
 
     def way(self, accuracy: Accuracy) -> Implementation | None:
         """The way that an accuracy chooses; None for the effect's own."""

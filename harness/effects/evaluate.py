@@ -16,19 +16,13 @@ from harness.effects.plan import Plan, PlannedEffect
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What came of a plan.
-
-    Attributes:
-        values: the wanted quantities, and everything computed on the way; arrays are read-only.
-        seconds: by effect, what each took; what came from the store took its reading.
-        calls: by effect, how often it was computed.
-        from_store: effects whose result was read instead of computed.
-    """
+    """What came of a plan."""
 
     values: Mapping[str, Any]
-    seconds: Mapping[str, float]
-    calls: Mapping[str, int]
-    from_store: tuple[str, ...]
+    """the wanted quantities, and everything computed on the way; arrays are read-only."""
+    seconds: Mapping[str, float]  #: by effect, what each took; what came from the store took its reading.
+    calls: Mapping[str, int]  #: by effect, how often it was computed.
+    from_store: tuple[str, ...]  #: effects whose result was read instead of computed.
 
     def __getitem__(self, quantity: str) -> Any:
         return self.values[quantity]

@@ -32,21 +32,14 @@ _OTHER = ("seconds_", "bytes")
 
 @dataclass(frozen=True)
 class NetworkInUse:
-    """A network that stands for a simulation.
+    """A network that stands for a simulation."""
 
-    Attributes:
-        dial: whose level it is.
-        file: of the ObjectFile.
-        instead_of: what is not simulated.
-        errors: of its model card, by names with units, where it was never trained.
-        seconds: of one query as its model card has it, by the name of the query; empty where it says none.
-    """
-
-    dial: str
-    file: str
-    instead_of: str
-    errors: Mapping[str, float]
+    dial: str  #: whose level it is.
+    file: str  #: of the ObjectFile.
+    instead_of: str  #: what is not simulated.
+    errors: Mapping[str, float]  #: of its model card, by names with units, where it was never trained.
     seconds: Mapping[str, float]
+    """of one query as its model card has it, by the name of the query; empty where it says none."""
 
 
 def scene_plan(scene: SceneFile, sensor: TactileSensor, accuracy: Accuracy | None = None) -> Plan:

@@ -45,19 +45,12 @@ _OTHER_SHARES = (0.05, 0.2)
 
 @dataclass(frozen=True, eq=False)
 class ReadForce:
-    """The force of one reading.
+    """The force of one reading."""
 
-    Attributes:
-        pressed: all but the reading's own error, of one press.
-        reading: share of the force, one standard deviation: what the reading is off by.
-        newtons: exactly 0 where nothing was seen to press.
-        uncertainty: N, one standard deviation.
-    """
-
-    pressed: ContactForce
-    reading: float
-    newtons: float
-    uncertainty: float
+    pressed: ContactForce  #: all but the reading's own error, of one press.
+    reading: float  #: share of the force, one standard deviation: what the reading is off by.
+    newtons: float  #: exactly 0 where nothing was seen to press.
+    uncertainty: float  #: N, one standard deviation.
 
 
 def _by(level: ForceLevel, given: Given, cells: int) -> ContactForce:

@@ -12,17 +12,11 @@ from harness.effects.effect import Effect, Facts, by_name, knobs_of
 
 @dataclass(frozen=True)
 class PlannedEffect:
-    """An effect that will run.
+    """An effect that will run."""
 
-    Attributes:
-        effect: itself, as its levels have it computed.
-        reason: who needs it, what in the scene calls for it, and in which of several ways it runs.
-        levels: of its knobs, the first that of its choice where it has one.
-    """
-
-    effect: Effect
-    reason: str
-    levels: Mapping[str, Level]
+    effect: Effect  #: itself, as its levels have it computed.
+    reason: str  #: who needs it, what in the scene calls for it, and in which of several ways it runs.
+    levels: Mapping[str, Level]  #: of its knobs, the first that of its choice where it has one.
 
 
 @dataclass(frozen=True)
@@ -35,21 +29,13 @@ class SkippedEffect:
 
 @dataclass(frozen=True)
 class Plan:
-    """What an evaluation will do.
+    """What an evaluation will do."""
 
-    Attributes:
-        wanted: quantities asked for.
-        ran: effects in the order in which they run.
-        skipped: every other effect of the catalogue.
-        aliases: quantities whose effect is bypassed, and what takes their place.
-        sources: quantities that must be given.
-    """
-
-    wanted: tuple[str, ...]
-    ran: tuple[PlannedEffect, ...]
-    skipped: tuple[SkippedEffect, ...]
-    aliases: Mapping[str, str]
-    sources: tuple[str, ...]
+    wanted: tuple[str, ...]  #: quantities asked for.
+    ran: tuple[PlannedEffect, ...]  #: effects in the order in which they run.
+    skipped: tuple[SkippedEffect, ...]  #: every other effect of the catalogue.
+    aliases: Mapping[str, str]  #: quantities whose effect is bypassed, and what takes their place.
+    sources: tuple[str, ...]  #: quantities that must be given.
 
     def resolved(self, quantity: str) -> str:
         """The quantity that stands for ``quantity`` once bypassed effects are passed through."""

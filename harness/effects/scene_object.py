@@ -16,15 +16,11 @@ from harness.sim.solid.walls import walled
 
 @dataclass(frozen=True, eq=False)
 class KnownObject:
-    """An object's surface, and how it came about.
+    """An object's surface, and how it came about."""
 
-    Attributes:
-        mesh: in metres, in the object's frame.
-        report: of the intake of a mesh file; None for a built-in object and for an ObjectFile.
-    """
-
-    mesh: Mesh
+    mesh: Mesh  #: in metres, in the object's frame.
     report: IntakeReport | None
+    """of the intake of a mesh file; None for a built-in object and for an ObjectFile."""
 
     @property
     def read(self) -> tuple[str, ...]:

@@ -45,23 +45,15 @@ DOTS = "sensor.dots"
 
 @dataclass(frozen=True, eq=False)
 class Press:
-    """A press, drawn.
+    """A press, drawn."""
 
-    Attributes:
-        gel: that was pressed.
-        plan: what ran, what did not, and why.
-        evaluation: every quantity on the way.
-        contact: ``(rows, columns)`` where the object touches.
-        of: whether the heights are of the object or, given or of an ObjectFile's network, of the gel.
-        missing: ``(rows, columns)`` where a given map had no height; None where every pixel has one.
-    """
-
-    gel: Gel
-    plan: Plan
-    evaluation: Evaluation
-    contact: BoolArray
-    of: Heights
+    gel: Gel  #: that was pressed.
+    plan: Plan  #: what ran, what did not, and why.
+    evaluation: Evaluation  #: every quantity on the way.
+    contact: BoolArray  #: ``(rows, columns)`` where the object touches.
+    of: Heights  #: whether the heights are of the object or, given or of an ObjectFile's network, of the gel.
     missing: BoolArray | None = None
+    """``(rows, columns)`` where a given map had no height; None where every pixel has one."""
 
     @property
     def image(self) -> ByteArray:

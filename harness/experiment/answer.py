@@ -103,15 +103,10 @@ def finish(
 
 @dataclass(frozen=True, eq=False)
 class WrittenAnswer:
-    """An answer that is written and published, and not yet compared.
+    """An answer that is written and published, and not yet compared."""
 
-    Attributes:
-        scored: the answer.
-        result: as it was written.
-    """
-
-    scored: Scored
-    result: dict[str, Any]
+    scored: Scored  #: the answer.
+    result: dict[str, Any]  #: as it was written.
 
 
 def write_answer(

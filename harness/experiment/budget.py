@@ -25,27 +25,16 @@ _NOTHING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class BudgetedAnswer:
-    """An answer as it was asked for.
+    """An answer as it was asked for."""
 
-    Attributes:
-        point: the setting that gave it.
-        solved: the answer itself.
-        seconds: s on the clock, from readings to answer.
-        cpu: s of CPU time, likewise.
-        predicted: s it was expected to take at most.
-        promise: m within which the truth lies in 95 % of runs; infinity where nothing is promised.
-        kept: whether the budget was kept, or the error promised.
-        tried: names of the settings tried, in order.
-    """
-
-    point: Point
-    solved: Solved
-    seconds: float
-    cpu: float
-    predicted: float
-    promise: float
-    kept: bool
-    tried: tuple[str, ...]
+    point: Point  #: the setting that gave it.
+    solved: Solved  #: the answer itself.
+    seconds: float  #: s on the clock, from readings to answer.
+    cpu: float  #: s of CPU time, likewise.
+    predicted: float  #: s it was expected to take at most.
+    promise: float  #: m within which the truth lies in 95 % of runs; infinity where nothing is promised.
+    kept: bool  #: whether the budget was kept, or the error promised.
+    tried: tuple[str, ...]  #: names of the settings tried, in order.
 
 
 def answer_as_asked(

@@ -36,19 +36,13 @@ CARRIED = ("object.mesh", "object.wall", "object.material", "sensor", "sensor.ca
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What the scene observes, as it should have been read.
+    """What the scene observes, as it should have been read."""
 
-    Attributes:
-        plan: which effects the scene called for.
-        evaluation: which ran, how often and how long; their values by name.
-        notes: what a reader must know of how it was simulated.
-        agreement: of the readings with a model of the object at the stated pose; None where not compared.
-    """
-
-    plan: Plan
-    evaluation: Evaluation
-    notes: tuple[str, ...] = ()
+    plan: Plan  #: which effects the scene called for.
+    evaluation: Evaluation  #: which ran, how often and how long; their values by name.
+    notes: tuple[str, ...] = ()  #: what a reader must know of how it was simulated.
     agreement: Agreement | None = None
+    """of the readings with a model of the object at the stated pose; None where not compared."""
 
     def observed(self) -> dict[str, dict[str, Any]]:
         """Every wanted quantity in JSON: shape and range of an array, parts of a mapping or a picture."""

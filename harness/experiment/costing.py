@@ -30,19 +30,13 @@ _ROUND = 24
 
 @dataclass(frozen=True)
 class Work:
-    """What is to be measured.
+    """What is to be measured."""
 
-    Attributes:
-        cells: the runs.
-        settings: of the dials.
-        counts: how many steps are used, each a condition of its own.
-        fewer: settings that are measured with fewer steps than the most; None for all of them.
-    """
-
-    cells: tuple[RunCell, ...]
-    settings: tuple[Setting, ...]
-    counts: tuple[int, ...]
+    cells: tuple[RunCell, ...]  #: the runs.
+    settings: tuple[Setting, ...]  #: of the dials.
+    counts: tuple[int, ...]  #: how many steps are used, each a condition of its own.
     fewer: tuple[Setting, ...] | None = None
+    """settings that are measured with fewer steps than the most; None for all of them."""
 
     @property
     def asked(self) -> tuple[tuple[int, Setting], ...]:

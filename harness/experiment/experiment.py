@@ -32,36 +32,23 @@ if TYPE_CHECKING:  # a report knows experiments and needs no simulator of the ar
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A run, planned and rehearsed.
+    """A run, planned and rehearsed."""
 
-    Attributes:
-        steps: the parameters of each, as JSON values.
-        rehearsal: what the twin found.
-        bench: the twin it was rehearsed in.
-        described: more that ``run.json`` keeps of the plan, as JSON values.
-        on_the_way: how many steps are planned, and rehearsed, once those before them are read.
-    """
-
-    steps: Sequence[Mapping[str, Any]]
-    rehearsal: "RehearsalReport"
-    bench: "TwinBench"
+    steps: Sequence[Mapping[str, Any]]  #: the parameters of each, as JSON values.
+    rehearsal: "RehearsalReport"  #: what the twin found.
+    bench: "TwinBench"  #: the twin it was rehearsed in.
     described: Mapping[str, Any] = field(default_factory=dict)
-    on_the_way: int = 0
+    """more that ``run.json`` keeps of the plan, as JSON values."""
+    on_the_way: int = 0  #: how many steps are planned, and rehearsed, once those before them are read.
 
 
 @dataclass(frozen=True, eq=False)
 class Helpers:
-    """What a step's performer may use beside the bench.
+    """What a step's performer may use beside the bench."""
 
-    Attributes:
-        twin: finds a way where the arm is not where a step's travel was planned from.
-        ask: shows a person what to do; None where nobody is there.
-        say: tells how the step goes.
-    """
-
-    twin: "TwinBench"
-    ask: Callable[[str], None] | None = None
-    say: Callable[[str], None] = lambda _: None
+    twin: "TwinBench"  #: finds a way where the arm is not where a step's travel was planned from.
+    ask: Callable[[str], None] | None = None  #: shows a person what to do; None where nobody is there.
+    say: Callable[[str], None] = lambda _: None  #: tells how the step goes.
 
 
 class Answering(Protocol):
@@ -81,57 +68,34 @@ class Answering(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Scored:
-    """An answer with what it is held against.
+    """An answer with what it is held against."""
 
-    Attributes:
-        run: the folder.
-        answering: the readings.
-        found: the answer, as the experiment has it.
-        truth: of a mocked run.
-        accuracy: the chosen level of every dial.
-        warnings: what the operator should know.
-        result: the answer as JSON values.
-    """
-
-    run: RunFiles
-    answering: Any
-    found: Any
-    truth: Truth | None
-    accuracy: Accuracy
-    warnings: tuple[str, ...]
-    result: Mapping[str, Any] = field(default_factory=dict)
+    run: RunFiles  #: the folder.
+    answering: Any  #: the readings.
+    found: Any  #: the answer, as the experiment has it.
+    truth: Truth | None  #: of a mocked run.
+    accuracy: Accuracy  #: the chosen level of every dial.
+    warnings: tuple[str, ...]  #: what the operator should know.
+    result: Mapping[str, Any] = field(default_factory=dict)  #: the answer as JSON values.
 
 
 @dataclass(frozen=True)
 class MeasuredCondition:
-    """What a table or a cost curve varies beside object and seed.
+    """What a table or a cost curve varies beside object and seed."""
 
-    Attributes:
-        name: ``"spacing"``.
-        levels: all that there are.
-        usual: those that a cost curve measures where nobody says.
-        tabled: those of a table.
-    """
-
-    name: str
-    levels: tuple[str, ...]
-    usual: tuple[str, ...]
-    tabled: tuple[str, ...] = ()
+    name: str  #: ``"spacing"``.
+    levels: tuple[str, ...]  #: all that there are.
+    usual: tuple[str, ...]  #: those that a cost curve measures where nobody says.
+    tabled: tuple[str, ...] = ()  #: those of a table.
 
 
 @dataclass(frozen=True)
 class MeasuredColumn:
-    """A mean that a table shows beside the errors, over the runs whose rows have it.
+    """A mean that a table shows beside the errors, over the runs whose rows have it."""
 
-    Attributes:
-        key: of a row's JSON values: a number, or a bool of which the share is shown.
-        heading: over it.
-        unit: ``"mm"`` of a value in metres, ``"%"`` of a share.
-    """
-
-    key: str
-    heading: str
-    unit: Literal["mm", "%"]
+    key: str  #: of a row's JSON values: a number, or a bool of which the share is shown.
+    heading: str  #: over it.
+    unit: Literal["mm", "%"]  #: ``"mm"`` of a value in metres, ``"%"`` of a share.
 
 
 class RunCell(Protocol):
@@ -201,47 +165,34 @@ class Perform(Protocol):
 
 @dataclass(frozen=True)
 class Measurement:
-    """How tables and cost curves measure an experiment.
+    """How tables and cost curves measure an experiment."""
 
-    Attributes:
-        estimator: module whose sources, with all they import, decide whether a curve still holds.
-        conditions: what is varied beside object, gap and seed.
-        cells: the runs of so many objects, seeds and levels of the conditions, ``gap`` among them.
-        run_cell: performs one in process and answers it by every method: ``rows`` by method, each with
-            ``error_m`` and ``seconds``; a share of rows may have ``error_symmetric_m``, ``in_region90``,
-            ``refused``, and ``gross`` where an error beyond ``gross`` m is not what a failure is.
-        methods: in the order of a table's rows.
-        performed: runs for a cost curve.
-        settings: of the dials, that a cost curve measures: every one of them, or the usual ones.
-        setting_name: of a setting, for people.
-        fewer: settings that are measured with fewer steps too.
-        counts: of steps, that a cost curve measures where nobody says.
-        regions: methods whose 90 % region a table scores.
-        gross: m: an error beyond this is a failure.
-        notes: sentences that a curve keeps, from the models made on the way.
-        published: what others printed, by method; for the foot of a table.
-        subjects: real meshes beside those of every experiment: file under the data folder, units, material.
-        columns: means beside the errors, in the order of a table.
-        per_object: keys of rows, lengths, whose mean on each object is printed too.
-    """
-
-    estimator: str
-    conditions: tuple[MeasuredCondition, ...]
+    estimator: str  #: module whose sources, with all they import, decide whether a curve still holds.
+    conditions: tuple[MeasuredCondition, ...]  #: what is varied beside object, gap and seed.
     cells: Callable[[Sequence[str], Sequence[int], Mapping[str, Sequence[str]]], Sequence[Any]]
+    """the runs of so many objects, seeds and levels of the conditions, ``gap`` among them."""
     run_cell: RunsCell
-    methods: tuple[str, ...]
-    performed: Perform
+    """performs one in process and answers it by every method: ``rows`` by method, each with ``error_m`` and
+    ``seconds``; a share of rows may have ``error_symmetric_m``, ``in_region90``, ``refused``, and ``gross``
+    where an error beyond ``gross`` m is not what a failure is."""
+    methods: tuple[str, ...]  #: in the order of a table's rows.
+    performed: Perform  #: runs for a cost curve.
     settings: Callable[[bool, Mapping[str, Sequence[str]], Mapping[str, SceneFile]], Sequence[Setting]]
-    setting_name: Callable[[Setting], str]
+    """of the dials, that a cost curve measures: every one of them, or the usual ones."""
+    setting_name: Callable[[Setting], str]  #: of a setting, for people.
     fewer: Callable[[Mapping[str, Sequence[str]]], Sequence[Setting]] | None = None
-    counts: tuple[int, ...] = (1,)
-    regions: tuple[str, ...] = ()
-    gross: float = 20.0e-3
+    """settings that are measured with fewer steps too."""
+    counts: tuple[int, ...] = (1,)  #: of steps, that a cost curve measures where nobody says.
+    regions: tuple[str, ...] = ()  #: methods whose 90 % region a table scores.
+    gross: float = 20.0e-3  #: m: an error beyond this is a failure.
     notes: Callable[[Mapping[str, Any]], tuple[str, ...]] = lambda _: ()
+    """sentences that a curve keeps, from the models made on the way."""
     published: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    """what others printed, by method; for the foot of a table."""
     subjects: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
-    columns: tuple[MeasuredColumn, ...] = ()
-    per_object: tuple[str, ...] = ()
+    """real meshes beside those of every experiment: file under the data folder, units, material."""
+    columns: tuple[MeasuredColumn, ...] = ()  #: means beside the errors, in the order of a table.
+    per_object: tuple[str, ...] = ()  #: keys of rows, lengths, whose mean on each object is printed too.
 
 
 @dataclass(frozen=True)
@@ -260,37 +211,25 @@ class ErrorBound:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Procedure:
-    """What an arm is to do at a bench, whatever is made of the readings: an experiment's or a calibration's.
+    """A task of the arm at a bench, independent of the use of its readings: an experiment or a calibration."""
 
-    Attributes:
-        name: in run folders, and on the command line.
-        step: what a step is called: ``"contact"``.
-        section: the model of its table in a scene file; None where it has none.
-        plan: chooses the steps and rehearses them.
-        performer: of the steps, at an open bench.
-        plan_key: where ``run.json`` keeps the steps.
-        gap: of a mocked bench where none is asked for; None for the station's.
-        observe: in place of what a scene file observes by default; None for just that.
-        assumed: tables and keys of a scene made from options, where they say nothing else.
-        error_key: of its table, that ``--error`` sets: the run itself ends when that is met; None where
-            ``--error`` chooses the levels of the answer.
-        smallest_error: lower bound of the error that a run states, of a scene and its mesh; needed with
-            ``error_key``.
-        sizes_unknown: whether it can do with an object whose size is hidden.
-    """
-
-    name: str
-    step: str
-    section: type[Section] | None = None
-    plan: Callable[[SceneFile, Station, Mesh, int], Planned]
-    performer: Callable[[RunFiles, Helpers], StepPerformer[Bench]]
-    plan_key: str = "steps"
-    gap: str | None = None
+    name: str  #: in run folders, and on the command line.
+    step: str  #: what a step is called: ``"contact"``.
+    section: type[Section] | None = None  #: the model of its table in a scene file; None where it has none.
+    plan: Callable[[SceneFile, Station, Mesh, int], Planned]  #: chooses the steps and rehearses them.
+    performer: Callable[[RunFiles, Helpers], StepPerformer[Bench]]  #: of the steps, at an open bench.
+    plan_key: str = "steps"  #: where ``run.json`` keeps the steps.
+    gap: str | None = None  #: of a mocked bench where none is asked for; None for the station's.
     observe: tuple[str, ...] | None = None
+    """in place of what a scene file observes by default; None for just that."""
     assumed: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """tables and keys of a scene made from options, where they say nothing else."""
     error_key: str | None = None
+    """of its table, that ``--error`` sets: the run itself ends when that is met; None where ``--error``
+    chooses the levels of the answer."""
     smallest_error: Callable[[SceneFile, Mesh], ErrorBound] | None = None
-    sizes_unknown: bool = False
+    """lower bound of the error that a run states, of a scene and its mesh; needed with ``error_key``."""
+    sizes_unknown: bool = False  #: whether it can do with an object whose size is hidden.
 
     @property
     def plural(self) -> str:
@@ -300,37 +239,27 @@ class Procedure:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Experiment(Procedure):
-    """One kind of question that a bench is asked.
+    """One kind of question that a bench is asked."""
 
-    Attributes:
-        title: of its report.
-        knobs: every dial that its answer and its comparison have.
-        answering: of a run, at an accuracy.
-        result: the answer as JSON values, keys with their units, with ``seconds`` and ``warnings``.
-        lines: the answer for people, from the whole result.
-        sources: what the answer gives the comparison, by name.
-        gives: the names of those sources; what else a scene observes is refused before anything moves.
-        report: writes the page of a scored run; None for the plain page of every experiment.
-        files: writes what the answer is beside its JSON values into the folder of ``result.json``, where the
-            result names it; None for nothing.
-        budgets: answers to a budget or an error; None where it cannot.
-        measurement: for tables and cost; None where it has none.
-        measured: what it finds of the object, so that no scene of it states it and readings have no model to
-            be compared with: a sentence; empty where shape, size and pose are stated.
-    """
-
-    title: str
-    knobs: tuple[Knob[Level], ...]
-    answering: Callable[[RunFiles, Accuracy], Answering]
+    title: str  #: of its report.
+    knobs: tuple[Knob[Level], ...]  #: every dial that its answer and its comparison have.
+    answering: Callable[[RunFiles, Accuracy], Answering]  #: of a run, at an accuracy.
     result: Callable[[Scored], dict[str, Any]]
-    lines: Callable[[Mapping[str, Any]], list[str]]
-    sources: Callable[[Scored], Mapping[str, Any]]
+    """the answer as JSON values, keys with their units, with ``seconds`` and ``warnings``."""
+    lines: Callable[[Mapping[str, Any]], list[str]]  #: the answer for people, from the whole result.
+    sources: Callable[[Scored], Mapping[str, Any]]  #: what the answer gives the comparison, by name.
     gives: tuple[str, ...]
+    """the names of those sources; what else a scene observes is refused before anything moves."""
     report: Callable[[Scored, Any, Mapping[str, Health] | None, Path], Path] | None = None
+    """writes the page of a scored run; None for the plain page of every experiment."""
     files: Callable[[Scored, Path], None] | None = None
-    budgets: Budgets | None = None
-    measurement: Measurement | None = None
+    """writes what the answer is beside its JSON values into the folder of ``result.json``, where the result
+    names it; None for nothing."""
+    budgets: Budgets | None = None  #: answers to a budget or an error; None where it cannot.
+    measurement: Measurement | None = None  #: for tables and cost; None where it has none.
     measured: str = ""
+    """what it finds of the object, so that no scene of it states it and readings have no model to be compared
+    with: a sentence; empty where shape, size and pose are stated."""
 
     @property
     def own_knobs(self) -> tuple[Knob[Level], ...]:

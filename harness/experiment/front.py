@@ -22,23 +22,14 @@ from harness.experiment.tables import measurement_of
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """The measured settings that a run goes by.
+    """The measured settings that a run goes by."""
 
-    Attributes:
-        points: of the condition nearest to the run's.
-        scale: how many times their seconds are to be expected, for its number of steps.
-        steps: how many the points were measured with.
-        reasons: why the curve is stale; empty where it is not.
-        made: when it was measured.
-        shipped: whether it came with the program.
-    """
-
-    points: tuple[Point, ...]
-    scale: float
-    steps: int
-    reasons: tuple[str, ...]
-    made: str
-    shipped: bool
+    points: tuple[Point, ...]  #: of the condition nearest to the run's.
+    scale: float  #: how many times their seconds are to be expected, for its number of steps.
+    steps: int  #: how many the points were measured with.
+    reasons: tuple[str, ...]  #: why the curve is stale; empty where it is not.
+    made: str  #: when it was measured.
+    shipped: bool  #: whether it came with the program.
 
     @property
     def vouches(self) -> bool:

@@ -38,19 +38,13 @@ _REHEARSED_ANSWERS = 2
 
 @dataclass(frozen=True, eq=False)
 class Performed:
-    """What came of a session at a bench.
+    """What came of a session at a bench."""
 
-    Attributes:
-        complete: whether every step was performed; False where Ctrl-C ended it early.
-        health: how the instruments did, by name.
-        answering: the readings taken in on the way; None where none were to be.
-        ended: s on the bench clock, when the last step was on the disk; None where none was performed.
-    """
-
-    complete: bool
-    health: dict[str, Health]
-    answering: Answering | None = None
+    complete: bool  #: whether every step was performed; False where Ctrl-C ended it early.
+    health: dict[str, Health]  #: how the instruments did, by name.
+    answering: Answering | None = None  #: the readings taken in on the way; None where none were to be.
     ended: float | None = None
+    """s on the bench clock, when the last step was on the disk; None where none was performed."""
 
 
 def steps_planned(procedure: Procedure, recording: Recording) -> int:

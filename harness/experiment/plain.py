@@ -31,15 +31,10 @@ DEFAULT = "default"
 
 @dataclass(frozen=True)
 class Answered:
-    """An answer that is one number.
+    """An answer that is one number."""
 
-    Attributes:
-        value: in the experiment's own unit.
-        seconds: that it took.
-    """
-
-    value: float
-    seconds: float
+    value: float  #: in the experiment's own unit.
+    seconds: float  #: that it took.
 
 
 @dataclass(frozen=True)
@@ -63,17 +58,11 @@ class PlainCell:
 
 @dataclass(frozen=True, eq=False)
 class PlainRun:
-    """A recorded run, to be answered at any setting of the dials; settings share nothing.
+    """A recorded run, to be answered at any setting of the dials; settings share nothing."""
 
-    Attributes:
-        experiment: that it is of.
-        recording: of it.
-        steps: from how many of its first steps.
-    """
-
-    experiment: Experiment
-    recording: Recording
-    steps: int
+    experiment: Experiment  #: that it is of.
+    recording: Recording  #: of it.
+    steps: int  #: from how many of its first steps.
     shared: tuple[float, float] = (0.0, 0.0)
 
     @property
@@ -241,15 +230,11 @@ class _Answers:
 
 @dataclass(frozen=True)
 class PlainPerforms:
-    """Performs the runs of a cost curve, one after the other.
+    """Performs the runs of a cost curve, one after the other."""
 
-    Attributes:
-        name: of the experiment.
-        scene_of: the scene of a cell, from that of its object.
-    """
-
-    name: str
+    name: str  #: of the experiment.
     scene_of: Callable[[SceneFile, Any], SceneFile] = lambda scene, _: scene
+    """the scene of a cell, from that of its object."""
 
     def __call__(
         self,

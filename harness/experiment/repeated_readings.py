@@ -18,17 +18,11 @@ SIGMAS = 3.0
 
 @dataclass(frozen=True)
 class PlaceTolerance:
-    """Largest differences between two contacts at one place.
+    """Largest differences between two contacts at one place."""
 
-    Attributes:
-        lateral: distance across the press axis in m.
-        axial: distance along the press axis in m.
-        tilt: angle between the press axes in rad.
-    """
-
-    lateral: float
-    axial: float
-    tilt: float
+    lateral: float  #: distance across the press axis in m.
+    axial: float  #: distance along the press axis in m.
+    tilt: float  #: angle between the press axes in rad.
 
     @classmethod
     def from_errors(cls, errors: BenchErrors, gel_thickness: float) -> "PlaceTolerance":

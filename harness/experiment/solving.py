@@ -16,15 +16,10 @@ TARGET = "target"
 
 @dataclass(frozen=True)
 class Target:
-    """What is asked of an answer: one of the two.
+    """What is asked of an answer: one of the two."""
 
-    Attributes:
-        seconds: s on the clock for the estimate.
-        error: m.
-    """
-
-    seconds: float | None = None
-    error: float | None = None
+    seconds: float | None = None  #: s on the clock for the estimate.
+    error: float | None = None  #: m.
 
     def __post_init__(self) -> None:
         if (self.seconds is None) == (self.error is None):
@@ -51,21 +46,13 @@ class Shared(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """An answer at one setting, and what it took beyond what settings share.
+    """An answer at one setting, and what it took beyond what settings share."""
 
-    Attributes:
-        found: the answer, as the experiment has it; None where it was refused.
-        radius: m, within which the answer itself claims 90 %; None where it claims nothing.
-        cpu: s of CPU time.
-        wall: s on the clock.
-        refusal: why, where it was refused.
-    """
-
-    found: Any
-    radius: float | None
-    cpu: float
-    wall: float
-    refusal: str | None = None
+    found: Any  #: the answer, as the experiment has it; None where it was refused.
+    radius: float | None  #: m, within which the answer itself claims 90 %; None where it claims nothing.
+    cpu: float  #: s of CPU time.
+    wall: float  #: s on the clock.
+    refusal: str | None = None  #: why, where it was refused.
 
 
 class Solver(Protocol):
@@ -102,22 +89,15 @@ class Solver(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Budgets:
-    """How an experiment answers as asked: within so many seconds, or to an error.
+    """How an experiment answers as asked: within so many seconds, or to an error."""
 
-    Attributes:
-        solver: of a run's readings.
-        finest: the setting asked after an answer, to say what more time would have given.
-        steps: that a run of a scene has.
-        condition: of a scene's runs, as the points of a curve have it, but for the number of steps.
-        unfit: why a scene's runs cannot be answered at a setting; None where they can.
-        offered: whether a setting is chosen while there are others.
-        shipped: the curve that came with the program; None where none did.
-    """
-
-    solver: Callable[[RunFiles], Solver]
-    finest: Setting
-    steps: Callable[[SceneFile], int]
+    solver: Callable[[RunFiles], Solver]  #: of a run's readings.
+    finest: Setting  #: the setting asked after an answer, to say what more time would have given.
+    steps: Callable[[SceneFile], int]  #: that a run of a scene has.
     condition: Callable[[SceneFile], Mapping[str, Level]] = lambda _: {"gap": "default"}
+    """of a scene's runs, as the points of a curve have it, but for the number of steps."""
     unfit: Callable[[SceneFile, Setting], str | None] = lambda _scene, _setting: None
+    """why a scene's runs cannot be answered at a setting; None where they can."""
     offered: Callable[[Setting], bool] = lambda _: True
-    shipped: Callable[[], Curve] | None = None
+    """whether a setting is chosen while there are others."""
+    shipped: Callable[[], Curve] | None = None  #: the curve that came with the program; None where none did.

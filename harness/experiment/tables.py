@@ -32,31 +32,21 @@ Key = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True, eq=False)
 class TableRow:
-    """One method under one condition.
+    """One method under one condition."""
 
-    Attributes:
-        conditions: by name.
-        method: which.
-        runs: how many.
-        raw: median, mean and share of gross errors, in the error's own unit.
-        symmetric: the same, modulo the object's symmetry; None for a random point.
-        held: share of runs whose 90 % region holds the truth; None where there is no region.
-        seconds: median of an answer; from all of the run's readings.
-        refused: of the runs, how many were not answered; each counts as the experiment says.
-        answered: mean of the others; None where none was refused, or all were.
-        means: of the experiment's columns, by key; of those runs that have it.
-    """
-
-    conditions: Mapping[str, str]
-    method: str
-    runs: int
+    conditions: Mapping[str, str]  #: by name.
+    method: str  #: which.
+    runs: int  #: how many.
     raw: tuple[Interval, Interval, Interval]
+    """median, mean and share of gross errors, in the error's own unit."""
     symmetric: tuple[Interval, Interval, Interval] | None
-    held: float | None
-    seconds: float
-    refused: int = 0
-    answered: Interval | None = None
+    """the same, modulo the object's symmetry; None for a random point."""
+    held: float | None  #: share of runs whose 90 % region holds the truth; None where there is no region.
+    seconds: float  #: median of an answer; from all of the run's readings.
+    refused: int = 0  #: of the runs, how many were not answered; each counts as the experiment says.
+    answered: Interval | None = None  #: mean of the others; None where none was refused, or all were.
     means: Mapping[str, float] = field(default_factory=dict)
+    """of the experiment's columns, by key; of those runs that have it."""
 
 
 def measure(

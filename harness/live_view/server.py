@@ -44,25 +44,15 @@ _START = 256
 
 @dataclass(frozen=True)
 class ViewRequest:
-    """A picture that is asked for; lengths in m, object's frame. None is what ``camera_for`` chooses.
+    """A picture that is asked for; lengths in m, object's frame. None is what ``camera_for`` chooses."""
 
-    Attributes:
-        camera: where it is.
-        look_at: what is in the middle.
-        up: in the picture.
-        light: towards the lamp; None for over the left shoulder.
-        field_of_view: rad across the picture's width.
-        width: pixels.
-        height: pixels.
-    """
-
-    camera: Three | None = None
-    look_at: Three | None = None
-    up: Three | None = None
-    light: Three | None = None
-    field_of_view: float = FIELD_OF_VIEW
-    width: int = _START
-    height: int = _START
+    camera: Three | None = None  #: where it is.
+    look_at: Three | None = None  #: what is in the middle.
+    up: Three | None = None  #: in the picture.
+    light: Three | None = None  #: towards the lamp; None for over the left shoulder.
+    field_of_view: float = FIELD_OF_VIEW  #: rad across the picture's width.
+    width: int = _START  #: pixels.
+    height: int = _START  #: pixels.
 
 
 NAMES = tuple(field.name for field in fields(ViewRequest))
@@ -88,15 +78,10 @@ _MEANT = {
 
 @dataclass(frozen=True, eq=False)
 class ViewFrame:
-    """A picture for a page.
+    """A picture for a page."""
 
-    Attributes:
-        png: of it, before white.
-        said: of how it was made: samples, rays, and seconds by stage.
-    """
-
-    png: bytes
-    said: Mapping[str, Any]
+    png: bytes  #: of it, before white.
+    said: Mapping[str, Any]  #: of how it was made: samples, rays, and seconds by stage.
 
 
 class LiveFrames:

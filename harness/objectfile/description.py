@@ -34,31 +34,18 @@ _MOST_BYTES = 16 * 2**20
 
 
 class Description(Entry):
-    """All of ``object.json``.
+    """All of ``object.json``."""
 
-    Attributes:
-        schema_number: ``schema`` in the file.
-        name: of the object.
-        units: of every length in the folder.
-        frame: of every point in the folder.
-        material: of the object.
-        mesh: its surface.
-        provenance: of the mesh.
-        audio: the sound; null until it is built.
-        touch: the touch; null until it is built.
-        vision: the look; null until it is built.
-    """
-
-    schema_number: Literal[1] = Field(alias="schema")
-    name: Annotated[str, Field(min_length=1, max_length=200)]
-    units: Literal["m"] = "m"
-    frame: Literal["as the mesh"] = "as the mesh"
-    material: MaterialEntry
-    mesh: MeshEntry
-    provenance: Provenance
-    audio: AudioEntry | None = None
-    touch: TouchEntry | None = None
-    vision: VisionEntry | None = None
+    schema_number: Literal[1] = Field(alias="schema")  #: ``schema`` in the file.
+    name: Annotated[str, Field(min_length=1, max_length=200)]  #: of the object.
+    units: Literal["m"] = "m"  #: of every length in the folder.
+    frame: Literal["as the mesh"] = "as the mesh"  #: of every point in the folder.
+    material: MaterialEntry  #: of the object.
+    mesh: MeshEntry  #: its surface.
+    provenance: Provenance  #: of the mesh.
+    audio: AudioEntry | None = None  #: the sound; null until it is built.
+    touch: TouchEntry | None = None  #: the touch; null until it is built.
+    vision: VisionEntry | None = None  #: the look; null until it is built.
 
     @property
     def files(self) -> tuple[FileEntry, ...]:

@@ -30,17 +30,11 @@ class Entry(StrictModel):
 
 
 class FileEntry(Entry):
-    """A file of the folder, and what its bytes must be.
+    """A file of the folder, and what its bytes must be."""
 
-    Attributes:
-        file: its name, beside ``object.json``.
-        sha256: of its bytes, hexadecimal.
-        bytes: its size.
-    """
-
-    file: Annotated[str, AfterValidator(_plain_name)]
-    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
-    bytes: Annotated[int, Field(gt=0, le=MOST_BYTES)]
+    file: Annotated[str, AfterValidator(_plain_name)]  #: its name, beside ``object.json``.
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]  #: of its bytes, hexadecimal.
+    bytes: Annotated[int, Field(gt=0, le=MOST_BYTES)]  #: its size.
 
 
 class Source(Entry):
@@ -54,27 +48,17 @@ class Source(Entry):
 
 
 class Provenance(Entry):
-    """How a part came to be, so that it can be made again.
+    """How a part came to be, so that it can be made again."""
 
-    Attributes:
-        code: versions and hashes of the programs.
-        seeds: of everything random, by name.
-        settings: that it was built with, by name.
-        sources: that it was made from.
-        licence: of the part.
-        made: date, if whoever built it wants one.
-        seconds: on the clock, by stage.
-        cpu_seconds: of the processor, by stage.
-    """
-
-    code: dict[str, str] = Field(default_factory=dict)
-    seeds: dict[str, int] = Field(default_factory=dict)
+    code: dict[str, str] = Field(default_factory=dict)  #: versions and hashes of the programs.
+    seeds: dict[str, int] = Field(default_factory=dict)  #: of everything random, by name.
     settings: dict[str, str | float | int | bool | None] = Field(default_factory=dict)
-    sources: tuple[Source, ...] = ()
-    licence: str
-    made: str | None = None
-    seconds: dict[str, float] = Field(default_factory=dict)
-    cpu_seconds: dict[str, float] = Field(default_factory=dict)
+    """that it was built with, by name."""
+    sources: tuple[Source, ...] = ()  #: that it was made from.
+    licence: str  #: of the part.
+    made: str | None = None  #: date, if whoever built it wants one.
+    seconds: dict[str, float] = Field(default_factory=dict)  #: on the clock, by stage.
+    cpu_seconds: dict[str, float] = Field(default_factory=dict)  #: of the processor, by stage.
 
 
 class MaterialEntry(Entry):
@@ -112,21 +96,13 @@ class MaterialEntry(Entry):
 
 
 class MeshEntry(FileEntry):
-    """The object's surface: what every point of a query is near to.
+    """The object's surface: what every point of a query is near to."""
 
-    Attributes:
-        metres_per_unit: of the numbers in the file.
-        vertices: their number.
-        faces: their number.
-        low_m: m, least corner of the bounding box.
-        high_m: m, greatest corner of the bounding box.
-    """
-
-    metres_per_unit: Annotated[float, Field(gt=0.0)]
-    vertices: Annotated[int, Field(ge=3)]
-    faces: Annotated[int, Field(ge=1)]
-    low_m: tuple[float, float, float]
-    high_m: tuple[float, float, float]
+    metres_per_unit: Annotated[float, Field(gt=0.0)]  #: of the numbers in the file.
+    vertices: Annotated[int, Field(ge=3)]  #: their number.
+    faces: Annotated[int, Field(ge=1)]  #: their number.
+    low_m: tuple[float, float, float]  #: m, least corner of the bounding box.
+    high_m: tuple[float, float, float]  #: m, greatest corner of the bounding box.
 
 
 class Tensor(Entry):
@@ -197,35 +173,22 @@ class Sampled(Entry):
 
 
 class SelfTest(Entry):
-    """What a graph gave when it was made.
+    """What a graph gave when it was made."""
 
-    Attributes:
-        rows: the number of queries, ``n``.
-        inputs: the queries.
-        outputs: some of the answers.
-        tolerance: that a number may differ by, in the greatest one of that output that is kept here.
-    """
-
-    rows: Annotated[int, Field(ge=1)]
-    inputs: Annotated[tuple[Whole, ...], Field(min_length=1)]
-    outputs: Annotated[tuple[Sampled, ...], Field(min_length=1)]
+    rows: Annotated[int, Field(ge=1)]  #: the number of queries, ``n``.
+    inputs: Annotated[tuple[Whole, ...], Field(min_length=1)]  #: the queries.
+    outputs: Annotated[tuple[Sampled, ...], Field(min_length=1)]  #: some of the answers.
     tolerance: Annotated[float, Field(gt=0.0, le=0.1)]
+    """that a number may differ by, in the greatest one of that output that is kept here."""
 
 
 class NetworkEntry(FileEntry):
-    """A graph in ONNX: what goes in, what comes out, and how to see that it still does.
+    """A graph in ONNX: what goes in, what comes out, and how to see that it still does."""
 
-    Attributes:
-        inputs: of the graph.
-        outputs: of the graph.
-        self_test: queries with their answers.
-        measured: errors, by names with their unit.
-    """
-
-    inputs: Annotated[tuple[Input, ...], Field(min_length=1)]
-    outputs: Annotated[tuple[Tensor, ...], Field(min_length=1)]
-    self_test: SelfTest
-    measured: dict[str, float] = Field(default_factory=dict)
+    inputs: Annotated[tuple[Input, ...], Field(min_length=1)]  #: of the graph.
+    outputs: Annotated[tuple[Tensor, ...], Field(min_length=1)]  #: of the graph.
+    self_test: SelfTest  #: queries with their answers.
+    measured: dict[str, float] = Field(default_factory=dict)  #: errors, by names with their unit.
 
     @model_validator(mode="after")
     def _tests_all(self) -> Self:
@@ -245,35 +208,21 @@ class TableEntry(FileEntry):
 
 
 class AudioEntry(Entry):
-    """The object's sound: its modes, and one or two ways to their shapes near the surface.
-
-    Attributes:
-        frequencies_hz: Hz, undamped, ascending.
-        dampings_per_s: 1/s: a mode decays as ``exp(-d t)``.
-        complete_up_to_hz: Hz below which no mode is missing.
-        mass_kg: kg.
-        rigid_modes: left out.
-        nodes: of the finite-element mesh.
-        elements: of the finite-element mesh.
-        residual: the greatest relative residual of a mode.
-        near_surface_m: m, how far from the surface a query may be.
-        network: of the shapes.
-        table: of the shapes.
-        provenance: of the sound.
-    """
+    """The object's sound: its modes, and one or two ways to their shapes near the surface."""
 
     frequencies_hz: Annotated[tuple[Annotated[float, Field(gt=0.0)], ...], Field(min_length=1)]
-    dampings_per_s: tuple[Annotated[float, Field(ge=0.0)], ...]
-    complete_up_to_hz: Annotated[float, Field(gt=0.0)]
-    mass_kg: Annotated[float, Field(gt=0.0)]
-    rigid_modes: Annotated[int, Field(ge=0)]
-    nodes: Annotated[int, Field(ge=4)]
-    elements: Annotated[int, Field(ge=1)]
-    residual: Annotated[float, Field(ge=0.0)]
-    near_surface_m: Annotated[float, Field(gt=0.0)]
-    network: NetworkEntry | None = None
-    table: TableEntry | None = None
-    provenance: Provenance
+    """Hz, undamped, ascending."""
+    dampings_per_s: tuple[Annotated[float, Field(ge=0.0)], ...]  #: 1/s: a mode decays as ``exp(-d t)``.
+    complete_up_to_hz: Annotated[float, Field(gt=0.0)]  #: Hz below which no mode is missing.
+    mass_kg: Annotated[float, Field(gt=0.0)]  #: kg.
+    rigid_modes: Annotated[int, Field(ge=0)]  #: left out.
+    nodes: Annotated[int, Field(ge=4)]  #: of the finite-element mesh.
+    elements: Annotated[int, Field(ge=1)]  #: of the finite-element mesh.
+    residual: Annotated[float, Field(ge=0.0)]  #: the greatest relative residual of a mode.
+    near_surface_m: Annotated[float, Field(gt=0.0)]  #: m, how far from the surface a query may be.
+    network: NetworkEntry | None = None  #: of the shapes.
+    table: TableEntry | None = None  #: of the shapes.
+    provenance: Provenance  #: of the sound.
 
     sense: ClassVar[Modality] = "audio"
 

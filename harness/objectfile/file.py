@@ -41,15 +41,10 @@ MESH = "mesh.ply"
 
 @dataclass(frozen=True, eq=False)
 class ObjectFile:
-    """What is known of one object.
+    """What is known of one object."""
 
-    Attributes:
-        folder: it lies in.
-        description: what its ``object.json`` says.
-    """
-
-    folder: Path
-    description: Description
+    folder: Path  #: it lies in.
+    description: Description  #: what its ``object.json`` says.
 
     @classmethod
     def open(cls, folder: Path) -> "ObjectFile":

@@ -22,17 +22,14 @@ Storage = Literal["float32", "float16"]
 
 @dataclass(frozen=True, eq=False)
 class MlpWeights:
-    """A multilayer perceptron on an encoded input: ReLU after every layer but the last.
-
-    Attributes:
-        layers: ``(weight, bias)`` of each, ``(in, out)`` and ``(out,)``: ``y = x @ weight + bias``.
-            The transposes of what torch's ``Linear.weight`` holds.
-        skips: layers, counted from 0, that take the encoded input in front of what the layer
-            before gave: ``[encoding, hidden]``. The network of ObjectFolder 2.0 has ``(5,)``.
-    """
+    """A multilayer perceptron on an encoded input: ReLU after every layer but the last."""
 
     layers: Sequence[tuple[AnyArray, AnyArray]]
+    """``(weight, bias)`` of each, ``(in, out)`` and ``(out,)``: ``y = x @ weight + bias``. The transposes of
+    what torch's ``Linear.weight`` holds."""
     skips: tuple[int, ...] = ()
+    """layers, counted from 0, that take the encoded input in front of what the layer before gave:
+    ``[encoding, hidden]``. The network of ObjectFolder 2.0 has ``(5,)``."""
 
     @property
     def outputs(self) -> int:
@@ -52,12 +49,9 @@ class Encoding:
 
     ``[v, sin(f0 v), cos(f0 v), sin(f1 v), cos(f1 v), ...]``, each block the whole vector: the order
     in which the first layer's rows (and a skip layer's) are counted.
-
-    Attributes:
-        frequencies: rad for a unit of the normalised input; empty for the input alone.
     """
 
-    frequencies: tuple[float, ...]
+    frequencies: tuple[float, ...]  #: rad for a unit of the normalised input; empty for the input alone.
 
     @classmethod
     def octaves(cls, count: int, first: float = 1.0) -> "Encoding":
@@ -71,15 +65,10 @@ class Encoding:
 
 @dataclass(frozen=True, eq=False)
 class Normaliser:
-    """``(input - shift) * factor``, in float64, before anything is encoded.
+    """``(input - shift) * factor``, in float64, before anything is encoded."""
 
-    Attributes:
-        shift: ``(d,)`` in the input's unit.
-        factor: ``(d,)`` in one over it.
-    """
-
-    shift: FloatArray
-    factor: FloatArray
+    shift: FloatArray  #: ``(d,)`` in the input's unit.
+    factor: FloatArray  #: ``(d,)`` in one over it.
 
     @classmethod
     def unit_box(cls, low: FloatArray, high: FloatArray) -> "Normaliser":

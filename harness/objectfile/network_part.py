@@ -23,27 +23,16 @@ def spread(found: AnyArray) -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class NetworkPart:
-    """A network to be written.
+    """A network to be written."""
 
-    Attributes:
-        file: its name in the folder.
-        graph: of the network.
-        inputs: it takes.
-        outputs: it gives.
-        asked: the inputs of its self-test, by name.
-        tolerance: of the self-test, of the greatest number of each output.
-        measured: its errors, by a name with its unit.
-        kept: the places of a flat output that the self-test keeps.
-    """
-
-    file: str
-    graph: ModelProto
-    inputs: tuple[Input, ...]
-    outputs: tuple[Tensor, ...]
-    asked: Mapping[str, AnyArray]
-    tolerance: float
-    measured: Mapping[str, float] = field(default_factory=dict)
-    kept: Callable[[AnyArray], IntArray] = spread
+    file: str  #: its name in the folder.
+    graph: ModelProto  #: of the network.
+    inputs: tuple[Input, ...]  #: it takes.
+    outputs: tuple[Tensor, ...]  #: it gives.
+    asked: Mapping[str, AnyArray]  #: the inputs of its self-test, by name.
+    tolerance: float  #: of the self-test, of the greatest number of each output.
+    measured: Mapping[str, float] = field(default_factory=dict)  #: its errors, by a name with its unit.
+    kept: Callable[[AnyArray], IntArray] = spread  #: the places of a flat output that the self-test keeps.
 
 
 def network_entry(part: NetworkPart, contents: dict[str, bytes]) -> NetworkEntry:

@@ -36,27 +36,17 @@ def ray_pixels(rows: int, columns: int) -> int:
 
 
 class GelEntry(Entry):
-    """The flat gel that the maps are of, and its skirt in its own pixels.
+    """The flat gel that the maps are of, and its skirt in its own pixels."""
 
-    Attributes:
-        name: of the sensor's make.
-        rows: pixels.
-        columns: pixels.
-        pitch_m: m, of a pixel.
-        thickness_m: m, of the gel.
-        skirt_kernels: pixels, widths of the pyramid of blurs.
-        skirt_final: pixels, width of the last blur.
-        skirt_core: share of the greatest depth from which the object shapes the gel.
-    """
-
-    name: str
-    rows: Size
-    columns: Size
-    pitch_m: Positive
-    thickness_m: Positive
-    skirt_kernels: tuple[Size, ...]
-    skirt_final: Size
+    name: str  #: of the sensor's make.
+    rows: Size  #: pixels.
+    columns: Size  #: pixels.
+    pitch_m: Positive  #: m, of a pixel.
+    thickness_m: Positive  #: m, of the gel.
+    skirt_kernels: tuple[Size, ...]  #: pixels, widths of the pyramid of blurs.
+    skirt_final: Size  #: pixels, width of the last blur.
     skirt_core: Annotated[float, Field(ge=0.0, le=1.0)]
+    """share of the greatest depth from which the object shapes the gel."""
 
     @classmethod
     def of(cls, sensor: TactileSensor, skirt: GelSkirt) -> Self:
@@ -89,21 +79,14 @@ class GelEntry(Entry):
 
 
 class CodesEntry(Entry):
-    """Codes of the surface.
+    """Codes of the surface."""
 
-    Attributes:
-        network: graph from a node and the gel's pose to a map.
-        nodes: places and outward normals.
-        most_off_m: m, how far a press may be from a node.
-        deepest_m: m, the greatest depth of a press; the least is 0, as a press is a motion and not learned.
-        most_tilt_rad: rad, the greatest tilt.
-    """
-
-    network: NetworkEntry
-    nodes: FileEntry
-    most_off_m: Positive
+    network: NetworkEntry  #: graph from a node and the gel's pose to a map.
+    nodes: FileEntry  #: places and outward normals.
+    most_off_m: Positive  #: m, how far a press may be from a node.
     deepest_m: Positive
-    most_tilt_rad: Annotated[float, Field(gt=0.0, lt=1.5)]
+    """m, the greatest depth of a press; the least is 0, as a press is a motion and not learned."""
+    most_tilt_rad: Annotated[float, Field(gt=0.0, lt=1.5)]  #: rad, the greatest tilt.
 
     @property
     def stated_rms(self) -> float:
@@ -116,25 +99,15 @@ class CodesEntry(Entry):
 
 
 class TouchEntry(Entry):
-    """The object's touch: what may be queried, and one or two networks that answer.
+    """The object's touch: what may be queried, and one or two networks that answer."""
 
-    Attributes:
-        gel: that the maps are of.
-        depth_m: m, least and greatest depth of a press, but for codes.
-        most_tilt_rad: rad, the greatest tilt, but for codes.
-        near_surface_m: m, how far from the surface a contact may be.
-        codes: network of the level ``codes``.
-        perceptron: network of the level ``perceptron``.
-        provenance: of the touch.
-    """
-
-    gel: GelEntry
-    depth_m: tuple[Positive, Positive]
-    most_tilt_rad: Annotated[float, Field(gt=0.0, lt=1.5)]
-    near_surface_m: Positive
-    codes: CodesEntry | None = None
-    perceptron: NetworkEntry | None = None
-    provenance: Provenance
+    gel: GelEntry  #: that the maps are of.
+    depth_m: tuple[Positive, Positive]  #: m, least and greatest depth of a press, but for codes.
+    most_tilt_rad: Annotated[float, Field(gt=0.0, lt=1.5)]  #: rad, the greatest tilt, but for codes.
+    near_surface_m: Positive  #: m, how far from the surface a contact may be.
+    codes: CodesEntry | None = None  #: network of the level ``codes``.
+    perceptron: NetworkEntry | None = None  #: network of the level ``perceptron``.
+    provenance: Provenance  #: of the touch.
 
     sense: ClassVar[Modality] = "touch"
 

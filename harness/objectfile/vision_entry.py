@@ -12,19 +12,12 @@ Cells = Annotated[int, Field(ge=1, le=MOST_CELLS)]
 
 
 class VisionGridEntry(Entry):
-    """Where the networks answer: cubes of a lattice in the object's frame; which ones, the graph says.
+    """Where the networks answer: cubes of a lattice in the object's frame; which ones, the graph says."""
 
-    Attributes:
-        low_m: m, least corner of the lattice.
-        cell_m: m, side of a cell.
-        cells: along x, y and z.
-        networks: cells that have one.
-    """
-
-    low_m: Corner
-    cell_m: Positive
-    cells: tuple[Cells, Cells, Cells]
-    networks: Annotated[int, Field(ge=1)]
+    low_m: Corner  #: m, least corner of the lattice.
+    cell_m: Positive  #: m, side of a cell.
+    cells: tuple[Cells, Cells, Cells]  #: along x, y and z.
+    networks: Annotated[int, Field(ge=1)]  #: cells that have one.
 
     @property
     def box(self) -> tuple[Corner, Corner]:
@@ -43,54 +36,37 @@ class VisionSizeEntry(Entry):
 
 
 class VisionShellEntry(Entry):
-    """How far behind the surface the networks were made to answer.
-
-    Attributes:
-        voxels_per_cell: the unit of that depth, along a side of a cell.
-        deep_voxels: behind the surface.
-    """
+    """How far behind the surface the networks were made to answer."""
 
     voxels_per_cell: Annotated[int, Field(ge=4, le=64, multiple_of=4)]
-    deep_voxels: Annotated[float, Field(ge=0.0, le=64.0)]
+    """the unit of that depth, along a side of a cell."""
+    deep_voxels: Annotated[float, Field(ge=0.0, le=64.0)]  #: behind the surface.
 
 
 class VisionEntry(Entry):
-    """The object's look: the networks, where they answer, and how their numbers are meant.
-
-    Attributes:
-        level: inputs of a network: ``osf`` place, view and light, as the paper's; ``osf-v`` also the
-            light's visibility and the surface's normal.
-        metres_per_unit: of the graph's points.
-        camera: its frame.
-        pixel: where its centre is.
-        views: the direction of a ray.
-        light: the direction of a light.
-        colour: of the answers.
-        density_per_m: 1/m that a density of 1 stands for.
-        grid: of cells.
-        size: of each network.
-        shell: in which the networks answer.
-        network: the graph; errors on held-out pictures under ``measured``.
-        surface: that pictures are drawn along; null where it is the mesh.
-        provenance: of the look.
-    """
+    """The object's look: the networks, where they answer, and how their numbers are meant."""
 
     level: Kind
-    metres_per_unit: Positive = 1.0
+    """inputs of a network: ``osf`` place, view and light, as the paper's; ``osf-v`` also the light's
+    visibility and the surface's normal."""
+    metres_per_unit: Positive = 1.0  #: of the graph's points.
     camera: Literal["OpenCV: x right, y down, z forward"] = "OpenCV: x right, y down, z forward"
+    """its frame."""
     pixel: Literal["row i, column j: centre at x = j + 0.5, y = i + 0.5"] = (
         "row i, column j: centre at x = j + 0.5, y = i + 0.5"
     )
-    views: Literal["unit, from the camera"] = "unit, from the camera"
+    """where its centre is."""
+    views: Literal["unit, from the camera"] = "unit, from the camera"  #: the direction of a ray.
     light: Literal["unit, towards the lamp; irradiance pi"] = "unit, towards the lamp; irradiance pi"
-    colour: Literal["linear, sRGB primaries"] = "linear, sRGB primaries"
-    density_per_m: Positive
-    grid: VisionGridEntry
-    size: VisionSizeEntry
-    shell: VisionShellEntry
-    network: NetworkEntry
-    surface: FileEntry | None = None
-    provenance: Provenance
+    """the direction of a light."""
+    colour: Literal["linear, sRGB primaries"] = "linear, sRGB primaries"  #: of the answers.
+    density_per_m: Positive  #: 1/m that a density of 1 stands for.
+    grid: VisionGridEntry  #: of cells.
+    size: VisionSizeEntry  #: of each network.
+    shell: VisionShellEntry  #: in which the networks answer.
+    network: NetworkEntry  #: the graph; errors on held-out pictures under ``measured``.
+    surface: FileEntry | None = None  #: that pictures are drawn along; null where it is the mesh.
+    provenance: Provenance  #: of the look.
 
     sense: ClassVar[Modality] = "vision"
 

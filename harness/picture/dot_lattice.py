@@ -9,23 +9,14 @@ from harness.basics.arrays import BoolArray, FloatArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class DotLattice:
-    """A grid laid through dots.
+    """A grid laid through dots."""
 
-    Attributes:
-        index: ``(n, 2)`` column and row of each dot from 0; -1 where it is on no grid.
-        origin: ``(2,)`` pixels (column, row), of the grid's first column and row.
-        step: ``(2, 2)`` pixels: first column to the next column of dots, second to the next row.
-        affine: ``(n, 2)`` pixels, by which dots are off the linear grid; NaN off the grid.
-        local: ``(n, 2)`` pixels, the same once a lens's smooth bend is taken out.
-        missing: ``(m, 2)`` column and row of places of the grid without a dot.
-    """
-
-    index: IntArray
-    origin: FloatArray
-    step: FloatArray
-    affine: FloatArray
-    local: FloatArray
-    missing: IntArray
+    index: IntArray  #: ``(n, 2)`` column and row of each dot from 0; -1 where it is on no grid.
+    origin: FloatArray  #: ``(2,)`` pixels (column, row), of the grid's first column and row.
+    step: FloatArray  #: ``(2, 2)`` pixels: first column to the next column of dots, second to the next row.
+    affine: FloatArray  #: ``(n, 2)`` pixels, by which dots are off the linear grid; NaN off the grid.
+    local: FloatArray  #: ``(n, 2)`` pixels, the same once a lens's smooth bend is taken out.
+    missing: IntArray  #: ``(m, 2)`` column and row of places of the grid without a dot.
 
     @property
     def on(self) -> BoolArray:

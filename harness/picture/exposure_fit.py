@@ -33,17 +33,11 @@ _SECOND_DIFFERENCE = 6.0
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """Pixels that may err together: a group is what one block has of one shade.
+    """Pixels that may err together: a group is what one block has of one shade."""
 
-    Attributes:
-        group: ``(n,)`` of each pixel, from 0 without a gap.
-        block: ``(groups,)`` from 0 without a gap.
-        shade: ``(groups,)`` from 0 without a gap.
-    """
-
-    group: AnyArray
-    block: AnyArray
-    shade: AnyArray
+    group: AnyArray  #: ``(n,)`` of each pixel, from 0 without a gap.
+    block: AnyArray  #: ``(groups,)`` from 0 without a gap.
+    shade: AnyArray  #: ``(groups,)`` from 0 without a gap.
 
     def __post_init__(self) -> None:
         for each in (self.group, self.block, self.shade):
@@ -156,33 +150,21 @@ _SURE = 3.0
 
 @dataclass(frozen=True, eq=False)
 class ExposureFit:
-    """Gain and offset of each channel, red, green and blue, and what they are off by.
+    """Gain and offset of each channel, red, green and blue, and what they are off by."""
 
-    Attributes:
-        kind: what was fitted; of what was not the error is zero.
-        gain: ``(3,)`` linear light of the picture for one of the simulation.
-        offset: ``(3,)`` linear light where the simulation is black.
-        gain_error: ``(3,)`` one standard deviation, with ``attenuation``.
-        offset_error: the same.
-        balance_error: ``(3,)`` one standard deviation of the gain over green's, relative; zero for green.
-        attenuation: ``(3,)`` of it, what the simulation's own errors may have made the gain smaller by.
-        scatter: ``(3,)`` robust standard deviation of what is left, linear light.
-        pixels: ``(3,)`` that were fitted.
-        saturated: ``(3,)`` that were asked for, and left out as black or white.
-        outliers: ``(3,)`` share of the fitted that have no weight.
-    """
-
-    kind: ExposureKind
-    gain: FloatArray
-    offset: FloatArray
-    gain_error: FloatArray
-    offset_error: FloatArray
+    kind: ExposureKind  #: what was fitted; of what was not the error is zero.
+    gain: FloatArray  #: ``(3,)`` linear light of the picture for one of the simulation.
+    offset: FloatArray  #: ``(3,)`` linear light where the simulation is black.
+    gain_error: FloatArray  #: ``(3,)`` one standard deviation, with ``attenuation``.
+    offset_error: FloatArray  #: the same.
     balance_error: FloatArray
+    """``(3,)`` one standard deviation of the gain over green's, relative; zero for green."""
     attenuation: FloatArray
-    scatter: FloatArray
-    pixels: AnyArray
-    saturated: AnyArray
-    outliers: FloatArray
+    """``(3,)`` of it, what the simulation's own errors may have made the gain smaller by."""
+    scatter: FloatArray  #: ``(3,)`` robust standard deviation of what is left, linear light.
+    pixels: AnyArray  #: ``(3,)`` that were fitted.
+    saturated: AnyArray  #: ``(3,)`` that were asked for, and left out as black or white.
+    outliers: FloatArray  #: ``(3,)`` share of the fitted that have no weight.
 
     def __post_init__(self) -> None:
         errors = (self.gain_error, self.offset_error, self.balance_error, self.attenuation)

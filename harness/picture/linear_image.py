@@ -15,18 +15,14 @@ class LinearImage:
 
     Colours are multiplied by coverage, so that pictures are laid over each other by adding:
     ``colour + (1 - alpha) * behind``.
-
-    Attributes:
-        colour: ``(rows, columns, 3)`` linear red, green, blue (sRGB's), mean over the whole pixel, zero
-            or more; under light of irradiance pi a white surface that faces it has 1.
-        alpha: ``(rows, columns)`` the share of each pixel that the object covers, 0 to 1.
-        depth: ``(rows, columns)`` m, z in the camera's frame, mean over what is covered; +inf where
-            nothing is.
     """
 
     colour: FloatArray
-    alpha: FloatArray
+    """``(rows, columns, 3)`` linear red, green, blue (sRGB's), mean over the whole pixel, zero or more; under
+    light of irradiance pi a white surface that faces it has 1."""
+    alpha: FloatArray  #: ``(rows, columns)`` the share of each pixel that the object covers, 0 to 1.
     depth: FloatArray
+    """``(rows, columns)`` m, z in the camera's frame, mean over what is covered; +inf where nothing is."""
 
     def __post_init__(self) -> None:
         shape = self.alpha.shape

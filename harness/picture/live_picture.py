@@ -24,47 +24,29 @@ _EDGE = 1
 
 @dataclass(frozen=True, eq=False)
 class Apart:
-    """How far two pictures are apart over the object's silhouette.
+    """How far two pictures are apart over the object's silhouette."""
 
-    Attributes:
-        psnr_db: in dB; infinite where they are the same.
-        ssim: mean of the structural similarity of its pixels.
-        rms_grey: root of the mean square, grey levels.
-    """
-
-    psnr_db: float
-    ssim: float
-    rms_grey: float
+    psnr_db: float  #: in dB; infinite where they are the same.
+    ssim: float  #: mean of the structural similarity of its pixels.
+    rms_grey: float  #: root of the mean square, grey levels.
 
 
 @dataclass(frozen=True, eq=False)
 class LiveComparison:
-    """A live picture and the simulated one, exposed alike.
+    """A live picture and the simulated one, exposed alike."""
 
-    Attributes:
-        live: ``(rows, columns, 3)`` RGB.
-        simulated: the same, exposed as the camera did, before the bench: its picture where there is one, else
-            the live picture itself, so that nothing but the object differs.
-        silhouette: ``(rows, columns)`` the object's pixels in the simulation.
-        mask: ``(rows, columns)`` the object's pixels in the live picture.
-        masked_by: ``"background"`` or ``"colours"``.
-        overlap: of both, 0 to 1 (IoU).
-        exposure: the fit.
-        fitted: how far they are apart over the silhouette.
-        unfitted: the same before anything was fitted.
-        seconds: s on the clock by stage.
-    """
-
-    live: ByteArray
+    live: ByteArray  #: ``(rows, columns, 3)`` RGB.
     simulated: ByteArray
-    silhouette: BoolArray
-    mask: BoolArray
-    masked_by: str
-    overlap: float
-    exposure: ExposureFit
-    fitted: Apart
-    unfitted: Apart
-    seconds: Mapping[str, float]
+    """the same, exposed as the camera did, before the bench: its picture where there is one, else the live
+    picture itself, so that nothing but the object differs."""
+    silhouette: BoolArray  #: ``(rows, columns)`` the object's pixels in the simulation.
+    mask: BoolArray  #: ``(rows, columns)`` the object's pixels in the live picture.
+    masked_by: str  #: ``"background"`` or ``"colours"``.
+    overlap: float  #: of both, 0 to 1 (IoU).
+    exposure: ExposureFit  #: the fit.
+    fitted: Apart  #: how far they are apart over the silhouette.
+    unfitted: Apart  #: the same before anything was fitted.
+    seconds: Mapping[str, float]  #: s on the clock by stage.
 
 
 def compare_live(

@@ -26,16 +26,13 @@ _LEAST = 12
 
 @dataclass(frozen=True, eq=False)
 class SeenOutline:
-    """How far an object reaches in a picture.
-
-    Attributes:
-        extents: ``(DIRECTIONS,)`` pixels from the picture's upper left corner, along each direction.
-        hidden: ``(DIRECTIONS,)`` bool: where the object may reach farther, behind what stands in front of it
-            or beyond the picture's border.
-    """
+    """How far an object reaches in a picture."""
 
     extents: FloatArray
+    """``(DIRECTIONS,)`` pixels from the picture's upper left corner, along each direction."""
     hidden: BoolArray
+    """``(DIRECTIONS,)`` bool: where the object may reach farther, behind what stands in front of it or beyond
+    the picture's border."""
 
 
 @cache

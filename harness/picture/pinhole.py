@@ -27,21 +27,13 @@ _PARALLEL = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Pinhole:
-    """Where a picture is taken from, and how large.
+    """Where a picture is taken from, and how large."""
 
-    Attributes:
-        width: columns of pixels, one or more.
-        height: rows of pixels, one or more.
-        focal_px: focal length in pixels, greater than zero; pixels are square.
-        centre_px: (x, y) of the optical axis in the picture, pixels.
-        object_from_camera: ``(4, 4)`` rigid, metres.
-    """
-
-    width: int
-    height: int
-    focal_px: float
-    centre_px: tuple[float, float]
-    object_from_camera: FloatArray
+    width: int  #: columns of pixels, one or more.
+    height: int  #: rows of pixels, one or more.
+    focal_px: float  #: focal length in pixels, greater than zero; pixels are square.
+    centre_px: tuple[float, float]  #: (x, y) of the optical axis in the picture, pixels.
+    object_from_camera: FloatArray  #: ``(4, 4)`` rigid, metres.
 
     def __post_init__(self) -> None:
         if self.width < 1 or self.height < 1:
@@ -186,15 +178,13 @@ class DirectionalLight:
 
     A white matt surface (albedo 1) that faces it has the radiance ``irradiance / pi``: with pi, the
     default, a picture's value is what a surface reflects of all that falls on it.
-
-    Attributes:
-        direction: ``(3,)`` unit, in the object's frame, from the object *towards* the light; a vector of
-            any length but zero is made unit.
-        irradiance: on a surface that faces the light, linear, zero or more; pi makes white 1.
     """
 
     direction: FloatArray
+    """``(3,)`` unit, in the object's frame, from the object *towards* the light; a vector of any length but
+    zero is made unit."""
     irradiance: float = float(np.pi)
+    """on a surface that faces the light, linear, zero or more; pi makes white 1."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "direction", read_only(unit_vector(self.direction, "the way to the light")))

@@ -22,17 +22,11 @@ AROUND_IMAGES = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """One contact as it was recorded.
+    """One contact as it was recorded."""
 
-    Attributes:
-        base_from_gel: ``(4, 4)`` as the arm reported it while pressed.
-        images: ``(n, rows, columns, 3)`` uint8, at least one frame taken while pressed.
-        strike: what was heard when the place was struck; None where it was not.
-    """
-
-    base_from_gel: FloatArray
-    images: ByteArray
-    strike: Strike | None = None
+    base_from_gel: FloatArray  #: ``(4, 4)`` as the arm reported it while pressed.
+    images: ByteArray  #: ``(n, rows, columns, 3)`` uint8, at least one frame taken while pressed.
+    strike: Strike | None = None  #: what was heard when the place was struck; None where it was not.
 
     def __post_init__(self) -> None:
         pose = np.asarray(self.base_from_gel, dtype=np.float64)

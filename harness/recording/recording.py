@@ -42,36 +42,22 @@ _BACKWARDS_TOLERANCE_NS = 10**9
 
 @dataclass(frozen=True)
 class RunHeader:
-    """What a run is, written once before anything moves.
+    """What a run is, written once before anything moves."""
 
-    Attributes:
-        experiment: its name on the command line.
-        scene: the resolved scene, as JSON values.
-        station: the resolved station, as JSON values.
-        plan: the steps that were planned, and how, as JSON values.
-        files: content hashes of the files copied into the folder, by name.
-        versions: of the project, its git commit and the libraries that shape numbers.
-        seed: of everything random in the run.
-        mock: how the mocked bench was started; None at a real bench.
-        clock_offset_ns: wall clock minus bench clock when the run was created; steps carry the offset of
-            their own session.
-        created: wall time, ISO 8601.
-        schema: of this file.
-        run_id: random identity of the run, which the truth of a mocked run repeats; empty before schema 3.
-    """
-
-    experiment: str
-    scene: Mapping[str, Any]
-    station: Mapping[str, Any]
-    plan: Mapping[str, Any]
-    files: Mapping[str, str]
-    versions: Mapping[str, str]
-    seed: int
-    mock: Mapping[str, Any] | None
+    experiment: str  #: its name on the command line.
+    scene: Mapping[str, Any]  #: the resolved scene, as JSON values.
+    station: Mapping[str, Any]  #: the resolved station, as JSON values.
+    plan: Mapping[str, Any]  #: the steps that were planned, and how, as JSON values.
+    files: Mapping[str, str]  #: content hashes of the files copied into the folder, by name.
+    versions: Mapping[str, str]  #: of the project, its git commit and the libraries that shape numbers.
+    seed: int  #: of everything random in the run.
+    mock: Mapping[str, Any] | None  #: how the mocked bench was started; None at a real bench.
     clock_offset_ns: int
-    created: str
-    schema: int = field(default=SCHEMA)
+    """wall clock minus bench clock when the run was created; steps carry the offset of their own session."""
+    created: str  #: wall time, ISO 8601.
+    schema: int = field(default=SCHEMA)  #: of this file.
     run_id: str = ""
+    """random identity of the run, which the truth of a mocked run repeats; empty before schema 3."""
 
 
 class Recording:

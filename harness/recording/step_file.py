@@ -38,32 +38,20 @@ from harness.picture.image_file import decode_jpeg, require_modest_picture
 
 @dataclass(frozen=True)
 class Step:
-    """One indivisible piece of an experiment: all of it is performed and recorded, or none.
+    """One indivisible piece of an experiment: all of it is performed and recorded, or none."""
 
-    Attributes:
-        index: from 0, without gaps.
-        kind: what is done, for example ``"press"``.
-        parameters: what was asked for, JSON values with the unit in the key.
-    """
-
-    index: int
-    kind: str
-    parameters: Mapping[str, Any]
+    index: int  #: from 0, without gaps.
+    kind: str  #: what is done, for example ``"press"``.
+    parameters: Mapping[str, Any]  #: what was asked for, JSON values with the unit in the key.
 
 
 @dataclass(frozen=True)
 class StepRecord:
-    """A step as it was performed.
+    """A step as it was performed."""
 
-    Attributes:
-        step: what was asked for.
-        readings: by channel name.
-        seconds: how long it took on the bench.
-    """
-
-    step: Step
-    readings: Mapping[str, Reading]
-    seconds: float
+    step: Step  #: what was asked for.
+    readings: Mapping[str, Reading]  #: by channel name.
+    seconds: float  #: how long it took on the bench.
 
 
 def write_step(path: Path, record: StepRecord, clock_offset_ns: int) -> None:
@@ -228,19 +216,14 @@ _JSON_SCHEMA = {
 
 @dataclass(frozen=True)
 class Codec:
-    """One way to write a sample.
+    """One way to write a sample."""
 
-    Attributes:
-        schema: name, encoding and bytes of the MCAP schema.
-        encoding: of the messages: ``"protobuf"`` or ``"json"``.
-        encode: from a reading, the index of a sample and its wall time in ns, to bytes.
-        decode: from bytes and the channel, to the value and the bytes it arrived as (or none).
-    """
-
-    schema: tuple[str, str, bytes]
-    encoding: str
+    schema: tuple[str, str, bytes]  #: name, encoding and bytes of the MCAP schema.
+    encoding: str  #: of the messages: ``"protobuf"`` or ``"json"``.
     encode: Callable[[Reading, int, int], bytes]
+    """from a reading, the index of a sample and its wall time in ns, to bytes."""
     decode: Callable[[bytes, Channel], tuple[AnyArray, bytes]]
+    """from bytes and the channel, to the value and the bytes it arrived as (or none)."""
 
 
 def codec_of(channel: Channel) -> Codec:

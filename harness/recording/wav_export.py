@@ -29,25 +29,15 @@ _WIDTHS = ((16, 24), (24, 24), (32, 32))
 
 @dataclass(frozen=True)
 class WavFile:
-    """One file, as ``wav.json`` lists it.
+    """One file, as ``wav.json`` lists it."""
 
-    Attributes:
-        file: its name.
-        step: of the run.
-        channel: that it holds.
-        rate_hz: measured, on the bench clock.
-        start_s: of the first sample, on the bench clock.
-        bits: of a sample.
-        shift_bits: by which counts were shifted up.
-    """
-
-    file: str
-    step: int
-    channel: str
-    rate_hz: float
-    start_s: float
-    bits: int
-    shift_bits: int
+    file: str  #: its name.
+    step: int  #: of the run.
+    channel: str  #: that it holds.
+    rate_hz: float  #: measured, on the bench clock.
+    start_s: float  #: of the first sample, on the bench clock.
+    bits: int  #: of a sample.
+    shift_bits: int  #: by which counts were shifted up.
 
 
 def export_wav(recording: Recording, folder: Path) -> list[WavFile]:

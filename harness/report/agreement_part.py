@@ -21,38 +21,24 @@ _SCALED = {"m": (1e3, "mm"), "Hz": (1e-3, "kHz"), "covered": (1.0, "covered")}
 
 @dataclass(frozen=True)
 class AgreementRow:
-    """One sense of the table.
+    """One sense of the table."""
 
-    Attributes:
-        sense: its name.
-        source: what it is compared with.
-        verdict: of it.
-        sentence: the residual that speaks most against the model with its numbers, or why there is none.
-        doubted: whether it does not fit.
-    """
-
-    sense: str
-    source: str
-    verdict: str
-    sentence: str
-    doubted: bool
+    sense: str  #: its name.
+    source: str  #: what it is compared with.
+    verdict: str  #: of it.
+    sentence: str  #: the residual that speaks most against the model with its numbers, or why there is none.
+    doubted: bool  #: whether it does not fit.
 
 
 @dataclass(frozen=True)
 class AgreementPart:
-    """What the part shows.
+    """What the part shows."""
 
-    Attributes:
-        about: the object that was compared with.
-        summary: whether all fits, or what is first in doubt.
-        rows: one a sense.
-        picture: live, model and difference of the step in doubt, or of the first; and why there is none.
-    """
-
-    about: str
-    summary: str
-    rows: tuple[AgreementRow, ...]
+    about: str  #: the object that was compared with.
+    summary: str  #: whether all fits, or what is first in doubt.
+    rows: tuple[AgreementRow, ...]  #: one a sense.
     picture: Picture | Missing
+    """live, model and difference of the step in doubt, or of the first; and why there is none."""
 
 
 def agreement_part(found: Agreement | Missing, album: Album) -> AgreementPart | Missing:

@@ -14,114 +14,67 @@ NOT_COMPARED = Missing("the readings were not compared with a model")
 
 @dataclass(frozen=True, eq=False)
 class AnswerRow:
-    """The answer of a run, for its last contact. Lengths in metres; None where unknown.
+    """The answer of a run, for its last contact. Lengths in metres; None where unknown."""
 
-    Attributes:
-        position: ``(3,)`` in the object's frame.
-        seconds: the estimate took, from recorded readings to this answer.
-        credible90: radius about the answer that holds 90 % of the posterior.
-        error: straight-line distance to the true contact.
-        error_symmetric: the same, the least over the object's rotations.
-        error_mean: mean error over all contacts of the run.
-        random_baseline: expected error of a random point of the surface.
-        geometry_baseline: error of the relative translations alone.
-        modes: how many separate places stay likely; more than 1 is an ambiguous answer.
-    """
-
-    position: FloatArray
-    seconds: float
-    credible90: float | None = None
-    error: float | None = None
-    error_symmetric: float | None = None
-    error_mean: float | None = None
-    random_baseline: float | None = None
-    geometry_baseline: float | None = None
-    modes: int = 1
+    position: FloatArray  #: ``(3,)`` in the object's frame.
+    seconds: float  #: the estimate took, from recorded readings to this answer.
+    credible90: float | None = None  #: radius about the answer that holds 90 % of the posterior.
+    error: float | None = None  #: straight-line distance to the true contact.
+    error_symmetric: float | None = None  #: the same, the least over the object's rotations.
+    error_mean: float | None = None  #: mean error over all contacts of the run.
+    random_baseline: float | None = None  #: expected error of a random point of the surface.
+    geometry_baseline: float | None = None  #: error of the relative translations alone.
+    modes: int = 1  #: how many separate places stay likely; more than 1 is an ambiguous answer.
 
 
 @dataclass(frozen=True, eq=False)
 class ContactRow:
-    """One press.
+    """One press."""
 
-    Attributes:
-        number: from 1.
-        step: name of the step in the recording.
-        live: ``(rows, columns, 3)`` uint8 RGB, what the sensor saw.
-        simulated: the same shape and type at the estimated contact.
-        live_height: ``(rows, columns)`` metres of indentation, from the live image.
-        simulated_height: ``(rows, columns)`` metres at the estimated contact.
-        object_from_gel: ``(4, 4)``, where the estimate puts the sensor.
-        posterior: after this contact and all before it.
-        truth: ``(3,)`` metres, or None.
-        error: metres of this contact's answer, or None.
-        flags: "slipped", "missed", "repeated" and the like, with what was done about it.
-        notes: other facts, as (name, value with unit).
-    """
-
-    number: int
-    step: str
-    live: AnyArray | Missing
-    simulated: AnyArray | Missing
-    live_height: FloatArray | Missing
-    simulated_height: FloatArray | Missing
-    object_from_gel: FloatArray | Missing
-    posterior: Posterior | Missing
-    truth: FloatArray | None = None
-    error: float | None = None
-    flags: tuple[str, ...] = ()
-    notes: tuple[tuple[str, str], ...] = ()
+    number: int  #: from 1.
+    step: str  #: name of the step in the recording.
+    live: AnyArray | Missing  #: ``(rows, columns, 3)`` uint8 RGB, what the sensor saw.
+    simulated: AnyArray | Missing  #: the same shape and type at the estimated contact.
+    live_height: FloatArray | Missing  #: ``(rows, columns)`` metres of indentation, from the live image.
+    simulated_height: FloatArray | Missing  #: ``(rows, columns)`` metres at the estimated contact.
+    object_from_gel: FloatArray | Missing  #: ``(4, 4)``, where the estimate puts the sensor.
+    posterior: Posterior | Missing  #: after this contact and all before it.
+    truth: FloatArray | None = None  #: ``(3,)`` metres, or None.
+    error: float | None = None  #: metres of this contact's answer, or None.
+    flags: tuple[str, ...] = ()  #: "slipped", "missed", "repeated" and the like, with what was done about it.
+    notes: tuple[tuple[str, str], ...] = ()  #: other facts, as (name, value with unit).
 
 
 @dataclass(frozen=True, eq=False)
 class BenchPart:
-    """A body in the picture of the bench.
+    """A body in the picture of the bench."""
 
-    Attributes:
-        mesh: metres, in its own frame.
-        base_from_part: ``(4, 4)``.
-        colour: red, green, blue from 0 to 1.
-        smooth: shade over edges of less than 35 degrees.
-    """
-
-    mesh: Mesh
-    base_from_part: FloatArray
-    colour: tuple[float, float, float]
-    smooth: bool = True
+    mesh: Mesh  #: metres, in its own frame.
+    base_from_part: FloatArray  #: ``(4, 4)``.
+    colour: tuple[float, float, float]  #: red, green, blue from 0 to 1.
+    smooth: bool = True  #: shade over edges of less than 35 degrees.
 
 
 @dataclass(frozen=True, eq=False)
 class BenchScene:
-    """What the picture of the bench shows: its bodies and, in base, the contact frames.
+    """What the picture of the bench shows: its bodies and, in base, the contact frames."""
 
-    Attributes:
-        parts: bodies; the object among them.
-        base_from_gels: ``(n, 4, 4)`` of the contacts, drawn as tool axes.
-        focus: ``(3,)`` metres, the point looked at.
-    """
-
-    parts: tuple[BenchPart, ...]
-    base_from_gels: FloatArray
-    focus: FloatArray
+    parts: tuple[BenchPart, ...]  #: bodies; the object among them.
+    base_from_gels: FloatArray  #: ``(n, 4, 4)`` of the contacts, drawn as tool axes.
+    focus: FloatArray  #: ``(3,)`` metres, the point looked at.
 
 
 @dataclass(frozen=True)
 class ErrorCurve:
-    """Errors in metres against contacts, or against seconds; the first curve is ours.
+    """Errors in metres against contacts, or against seconds; the first curve is ours."""
 
-    Attributes:
-        name: in the legend.
-        x: contacts, or seconds.
-        error: metres, as many.
-        labels: beside each point, or empty.
-        by: "both", "touch", "audio", "geometry" or "particle", which has a colour of its own; empty for
-            the next of the chart's colours.
-    """
-
-    name: str
-    x: tuple[float, ...]
-    error: tuple[float, ...]
-    labels: tuple[str, ...] = ()
+    name: str  #: in the legend.
+    x: tuple[float, ...]  #: contacts, or seconds.
+    error: tuple[float, ...]  #: metres, as many.
+    labels: tuple[str, ...] = ()  #: beside each point, or empty.
     by: str = ""
+    """"both", "touch", "audio", "geometry" or "particle", which has a colour of its own; empty for the next
+    of the chart's colours."""
 
 
 @dataclass(frozen=True)
@@ -152,42 +105,25 @@ class Artefact:
 
 @dataclass(frozen=True)
 class EffectRun:
-    """An effect of the simulation that ran, or did not, and why.
+    """An effect of the simulation that ran, or did not, and why."""
 
-    Attributes:
-        name: what it provides.
-        ran: whether it was computed.
-        reason: in words.
-        calls: how often, None if not counted.
-        seconds: total, None if not timed.
-        stored: whether it was read from the store of results instead of computed.
-    """
-
-    name: str
-    ran: bool
-    reason: str
-    calls: int | None = None
-    seconds: float | None = None
-    stored: bool = False
+    name: str  #: what it provides.
+    ran: bool  #: whether it was computed.
+    reason: str  #: in words.
+    calls: int | None = None  #: how often, None if not counted.
+    seconds: float | None = None  #: total, None if not timed.
+    stored: bool = False  #: whether it was read from the store of results instead of computed.
 
 
 @dataclass(frozen=True)
 class Observed:
-    """A simulated quantity that the scene asked for.
+    """A simulated quantity that the scene asked for."""
 
-    Attributes:
-        name: of the effect that provides it, and of a part of it.
-        shape: of the array; what it is where it is none.
-        least: of its numbers; None where it has none.
-        mean: likewise.
-        most: likewise.
-    """
-
-    name: str
-    shape: str
-    least: float | None = None
-    mean: float | None = None
-    most: float | None = None
+    name: str  #: of the effect that provides it, and of a part of it.
+    shape: str  #: of the array; what it is where it is none.
+    least: float | None = None  #: of its numbers; None where it has none.
+    mean: float | None = None  #: likewise.
+    most: float | None = None  #: likewise.
 
 
 @dataclass(frozen=True)
@@ -203,69 +139,40 @@ class TwinDeviation:
 
 @dataclass(frozen=True, eq=False)
 class SenseAnswer:
-    """The last contact by one sense, or by both.
+    """The last contact by one sense, or by both."""
 
-    Attributes:
-        name: "touch", "audio" or "both".
-        posterior: by it; where it refused the object, why.
-        error: metres from the true contact; None where unknown.
-        area: m^2 of the surface that hold 90 % of the posterior.
-        seconds: the estimate took.
-    """
-
-    name: str
-    posterior: Posterior | Missing
-    error: float | None = None
-    area: float | None = None
-    seconds: float | None = None
+    name: str  #: "touch", "audio" or "both".
+    posterior: Posterior | Missing  #: by it; where it refused the object, why.
+    error: float | None = None  #: metres from the true contact; None where unknown.
+    area: float | None = None  #: m^2 of the surface that hold 90 % of the posterior.
+    seconds: float | None = None  #: the estimate took.
 
 
 @dataclass(frozen=True, eq=False)
 class SpectrogramPair:
-    """A strike as it was heard beside what the model says at the estimated place.
+    """A strike as it was heard beside what the model says at the estimated place."""
 
-    Attributes:
-        contact: whose strike, from 1.
-        times: ``(n,)`` s from the strike.
-        frequencies: ``(f,)`` Hz.
-        recorded: ``(f, n)`` dB against its own loudest.
-        simulated: ``(f, n)`` dB against its own loudest.
-    """
-
-    contact: int
-    times: FloatArray
-    frequencies: FloatArray
-    recorded: FloatArray
-    simulated: FloatArray
+    contact: int  #: whose strike, from 1.
+    times: FloatArray  #: ``(n,)`` s from the strike.
+    frequencies: FloatArray  #: ``(f,)`` Hz.
+    recorded: FloatArray  #: ``(f, n)`` dB against its own loudest.
+    simulated: FloatArray  #: ``(f, n)`` dB against its own loudest.
 
 
 @dataclass(frozen=True)
 class PeakLine:
-    """A peak that the strikes have in common, and the modes it is taken for.
+    """A peak that the strikes have in common, and the modes it is taken for."""
 
-    Attributes:
-        frequency: Hz, as heard.
-        damping: 1/s, as heard.
-        residual: from 0 to 1, share of the peak's band that is not one waveform.
-        level: dB against the strongest peak.
-        modes: numbers of the matched modes, from 1; empty where no mode explains the peak.
-        mode_frequency: Hz, of the matched modes at the common scale; None where there is none.
-        mode_damping: 1/s, of the matched modes; None where there is none.
-        probability: of the match.
-        nats: that the peak adds at the answer, over a peak that says nothing.
-        weight: how much of its nats counts in the posterior.
-    """
-
-    frequency: float
-    damping: float
-    residual: float
-    level: float
-    modes: tuple[int, ...]
-    mode_frequency: float | None
-    mode_damping: float | None
-    probability: float
-    nats: float
-    weight: float
+    frequency: float  #: Hz, as heard.
+    damping: float  #: 1/s, as heard.
+    residual: float  #: from 0 to 1, share of the peak's band that is not one waveform.
+    level: float  #: dB against the strongest peak.
+    modes: tuple[int, ...]  #: numbers of the matched modes, from 1; empty where no mode explains the peak.
+    mode_frequency: float | None  #: Hz, of the matched modes at the common scale; None where there is none.
+    mode_damping: float | None  #: 1/s, of the matched modes; None where there is none.
+    probability: float  #: of the match.
+    nats: float  #: that the peak adds at the answer, over a peak that says nothing.
+    weight: float  #: how much of its nats counts in the posterior.
 
     @property
     def counted(self) -> float:
@@ -280,104 +187,61 @@ class PeakLine:
 
 @dataclass(frozen=True)
 class StrikeLine:
-    """One contact's strike.
+    """One contact's strike."""
 
-    Attributes:
-        contact: from 1.
-        unused: why it does not count; empty where it does.
-        force: N, greatest; None where there was no strike.
-        contact_time: s between the rise to a tenth of the greatest force and the fall to it.
-        pressure: Pa, greatest.
-    """
-
-    contact: int
-    unused: str
-    force: float | None = None
+    contact: int  #: from 1.
+    unused: str  #: why it does not count; empty where it does.
+    force: float | None = None  #: N, greatest; None where there was no strike.
     contact_time: float | None = None
-    pressure: float | None = None
+    """s between the rise to a tenth of the greatest force and the fall to it."""
+    pressure: float | None = None  #: Pa, greatest.
 
 
 @dataclass(frozen=True, eq=False)
 class Sound:
-    """What each sense contributed to the answer, and what the strikes of a run said.
+    """What each sense contributed to the answer, and what the strikes of a run said."""
 
-    Attributes:
-        senses: touch, audio and both, in that order.
-        strikes: one line a contact.
-        pair: of the last strike that counts.
-        peaks: by ascending frequency.
-        set_aside: peaks that were heard and are not one waveform, or are echoes.
-        band: Hz, least and greatest frequency that at least two strikes excited; None where none.
-        scale: real frequency over the model's, the most probable one.
-    """
-
-    senses: tuple[SenseAnswer, ...]
-    strikes: tuple[StrikeLine, ...]
-    pair: SpectrogramPair | Missing
-    peaks: tuple[PeakLine, ...] | Missing
-    set_aside: int = 0
+    senses: tuple[SenseAnswer, ...]  #: touch, audio and both, in that order.
+    strikes: tuple[StrikeLine, ...]  #: one line a contact.
+    pair: SpectrogramPair | Missing  #: of the last strike that counts.
+    peaks: tuple[PeakLine, ...] | Missing  #: by ascending frequency.
+    set_aside: int = 0  #: peaks that were heard and are not one waveform, or are echoes.
     band: tuple[float, float] | None = None
-    scale: float = 1.0
+    """Hz, least and greatest frequency that at least two strikes excited; None where none."""
+    scale: float = 1.0  #: real frequency over the model's, the most probable one.
 
 
 @dataclass(frozen=True, eq=False)
 class ReportData:
-    """A run's report.
+    """A run's report."""
 
-    Attributes:
-        title: what was asked.
-        object_name: as the operator calls it.
-        material: of the object.
-        mesh: the estimator's mesh, metres, object frame.
-        mock: whether the far end of every cable was a mock.
-        made: date and time of the run, as text.
-        command: what was typed.
-        recording: where it lies, as text.
-        answer: of the last contact.
-        contacts: in order.
-        bench: for the picture.
-        error_by_contact: errors after 1, 2, ... contacts.
-        error_by_seconds: errors at levels of accuracy against the seconds they took.
-        instruments: one row each.
-        calibrations: one row each.
-        effects: one row each.
-        world: what the mocked world did differently from the estimator's model, by name.
-        twin: recorded poses against the rehearsal.
-        versions: of packages, by name.
-        git: hash of the checkout, with "+" if it was changed.
-        sound: what each sense contributed.
-        symmetry: the object's, in words.
-        accuracy: the chosen levels by knob.
-        networks: of the object's ObjectFile, which stood for a simulation.
-        warnings: what the operator should know.
-        observed: what the scene observes, simulated at the answer.
-        agreement: of the readings with a model of the object at the stated pose.
-    """
-
-    title: str
-    object_name: str
-    material: str
-    mesh: Mesh
-    mock: bool
-    made: str
-    command: str
-    recording: str
-    answer: AnswerRow | Missing
-    contacts: tuple[ContactRow, ...]
-    bench: BenchScene | Missing
-    error_by_contact: tuple[ErrorCurve, ...] | Missing
+    title: str  #: what was asked.
+    object_name: str  #: as the operator calls it.
+    material: str  #: of the object.
+    mesh: Mesh  #: the estimator's mesh, metres, object frame.
+    mock: bool  #: whether the far end of every cable was a mock.
+    made: str  #: date and time of the run, as text.
+    command: str  #: what was typed.
+    recording: str  #: where it lies, as text.
+    answer: AnswerRow | Missing  #: of the last contact.
+    contacts: tuple[ContactRow, ...]  #: in order.
+    bench: BenchScene | Missing  #: for the picture.
+    error_by_contact: tuple[ErrorCurve, ...] | Missing  #: errors after 1, 2, ... contacts.
     error_by_seconds: tuple[ErrorCurve, ...] | Missing
-    instruments: tuple[InstrumentRow, ...] | Missing
-    calibrations: tuple[Artefact, ...] | Missing
-    effects: tuple[EffectRun, ...] | Missing
+    """errors at levels of accuracy against the seconds they took."""
+    instruments: tuple[InstrumentRow, ...] | Missing  #: one row each.
+    calibrations: tuple[Artefact, ...] | Missing  #: one row each.
+    effects: tuple[EffectRun, ...] | Missing  #: one row each.
     world: dict[str, str] | Missing
-    twin: tuple[TwinDeviation, ...] | Missing
-    versions: dict[str, str]
-    git: str
-    sound: Sound | Missing
-    symmetry: str = "not looked for"
-    accuracy: dict[str, str] = field(default_factory=dict)
-    networks: tuple[NetworkInUse, ...] = ()
-    warnings: tuple[str, ...] = ()
-    observed: tuple[Observed, ...] = ()
+    """what the mocked world did differently from the estimator's model, by name."""
+    twin: tuple[TwinDeviation, ...] | Missing  #: recorded poses against the rehearsal.
+    versions: dict[str, str]  #: of packages, by name.
+    git: str  #: hash of the checkout, with "+" if it was changed.
+    sound: Sound | Missing  #: what each sense contributed.
+    symmetry: str = "not looked for"  #: the object's, in words.
+    accuracy: dict[str, str] = field(default_factory=dict)  #: the chosen levels by knob.
+    networks: tuple[NetworkInUse, ...] = ()  #: of the object's ObjectFile, which stood for a simulation.
+    warnings: tuple[str, ...] = ()  #: what the operator should know.
+    observed: tuple[Observed, ...] = ()  #: what the scene observes, simulated at the answer.
     agreement: Agreement | Missing = field(default_factory=lambda: NOT_COMPARED)
+    """of the readings with a model of the object at the stated pose."""

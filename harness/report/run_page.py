@@ -43,19 +43,13 @@ _HEARD_WITH = {"hammer": ("microphone",)}
 
 @dataclass(frozen=True)
 class PageSection:
-    """A part of a page that an experiment adds.
+    """A part of a page that an experiment adds."""
 
-    Attributes:
-        title: over it.
-        words: a sentence or two.
-        picture: below them; None for none.
-        turned: a surface that a page's reader can turn, below the picture; None for none.
-    """
-
-    title: str
-    words: str
-    picture: Picture | None = None
+    title: str  #: over it.
+    words: str  #: a sentence or two.
+    picture: Picture | None = None  #: below them; None for none.
     turned: TurnedSurface | None = None
+    """a surface that a page's reader can turn, below the picture; None for none."""
 
 
 def write_run_page(

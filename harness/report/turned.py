@@ -21,19 +21,12 @@ _WIDER = 1.2
 
 @dataclass(frozen=True)
 class TurnedSurface:
-    """Arrays in base64, little endian; the surface's middle is their origin, z is up.
+    """Arrays in base64, little endian; the surface's middle is their origin, z is up."""
 
-    Attributes:
-        places: int16, three a vertex, in equal steps.
-        faces: uint16, the three vertices of each.
-        colours: uint8, red, green and blue of each vertex.
-        marks: int16, three of each contact, in the same steps.
-    """
-
-    places: str
-    faces: str
-    colours: str
-    marks: str
+    places: str  #: int16, three a vertex, in equal steps.
+    faces: str  #: uint16, the three vertices of each.
+    colours: str  #: uint8, red, green and blue of each vertex.
+    marks: str  #: int16, three of each contact, in the same steps.
 
 
 def turned_surface(shown: KnownSurface, most_faces: int = MOST_FACES) -> TurnedSurface:

@@ -14,20 +14,11 @@ class Missing:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Where a contact may have been, as weighted places on the object.
+    """Where a contact may have been, as weighted places on the object."""
 
-    Attributes:
-        points: ``(n, 3)`` metres, object frame.
-        weights: ``(n,)``, not negative, any sum but zero.
-        estimate: ``(3,)`` metres.
-        modes: ``(k, 3)`` metres, separate likely places, best first.
-        mode_weights: ``(k,)`` share of the posterior each holds.
-        credible90: metres.
-    """
-
-    points: FloatArray
-    weights: FloatArray
-    estimate: FloatArray
-    modes: FloatArray
-    mode_weights: FloatArray
-    credible90: float
+    points: FloatArray  #: ``(n, 3)`` metres, object frame.
+    weights: FloatArray  #: ``(n,)``, not negative, any sum but zero.
+    estimate: FloatArray  #: ``(3,)`` metres.
+    modes: FloatArray  #: ``(k, 3)`` metres, separate likely places, best first.
+    mode_weights: FloatArray  #: ``(k,)`` share of the posterior each holds.
+    credible90: float  #: metres.

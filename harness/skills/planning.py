@@ -29,23 +29,15 @@ _IN_VAIN = 6
 
 @dataclass(frozen=True, eq=False)
 class RunPlan:
-    """Every motion of a run.
+    """Every motion of a run."""
 
-    Attributes:
-        bench: the twin it was rehearsed in.
-        sites: where the gel is to go.
-        contacts: how it gets there.
-        strikes: how the hammer gets there after each of the first; empty where the arm makes none.
-        rehearsal: what the twin found.
-        seconds: by stage of the planning.
-    """
-
-    bench: TwinBench
-    sites: tuple[Site, ...]
-    contacts: tuple[PlannedContact, ...]
+    bench: TwinBench  #: the twin it was rehearsed in.
+    sites: tuple[Site, ...]  #: where the gel is to go.
+    contacts: tuple[PlannedContact, ...]  #: how it gets there.
     strikes: tuple[PlannedStrike, ...]
-    rehearsal: RehearsalReport
-    seconds: dict[str, float] = field(default_factory=dict)
+    """how the hammer gets there after each of the first; empty where the arm makes none."""
+    rehearsal: RehearsalReport  #: what the twin found.
+    seconds: dict[str, float] = field(default_factory=dict)  #: by stage of the planning.
 
     def parameters(self) -> list[dict[str, Any]]:
         """The steps, as JSON values."""
@@ -68,19 +60,14 @@ class RunPlan:
 
 @dataclass(frozen=True)
 class ContactRequest:
-    """The contacts that an experiment asks for.
+    """The contacts that an experiment asks for."""
 
-    Attributes:
-        contacts: how many.
-        spacing: ``"close"``, each within ``presses.step`` of the last; ``"spread"``, over the object.
-        presses: how far apart, how tilted, how deep.
-        strikes: how many of the first places are struck too, where the scene is heard; None for all.
-    """
-
-    contacts: int
+    contacts: int  #: how many.
     spacing: Literal["close", "spread"]
-    presses: PressLimits
+    """``"close"``, each within ``presses.step`` of the last; ``"spread"``, over the object."""
+    presses: PressLimits  #: how far apart, how tilted, how deep.
     strikes: int | None = None
+    """how many of the first places are struck too, where the scene is heard; None for all."""
 
 
 def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int, wanted: ContactRequest) -> RunPlan:

@@ -61,25 +61,16 @@ ZEROED_BY = 10
 
 @dataclass(frozen=True, eq=False)
 class ContactMotion:
-    """One contact, ready to be performed.
+    """One contact, ready to be performed."""
 
-    Attributes:
-        start: ``(6,)`` rad, where the travel was planned to start.
-        travel: ``(n, 6)`` rad, joint way points from there to the stand-off.
-        base_from_stand_off: ``(4, 4)`` of the flange.
-        axis: ``(3,)`` unit in base: the way the gel is pressed.
-        search: m from the stand-off to where the gel would first touch the nominal surface.
-        press: m to press on after the first touch.
-        overtravel: m beyond ``search`` before a touch is given up; None for that of the performer's speeds.
-    """
-
-    start: FloatArray
-    travel: FloatArray
-    base_from_stand_off: FloatArray
-    axis: FloatArray
-    search: float
-    press: float
+    start: FloatArray  #: ``(6,)`` rad, where the travel was planned to start.
+    travel: FloatArray  #: ``(n, 6)`` rad, joint way points from there to the stand-off.
+    base_from_stand_off: FloatArray  #: ``(4, 4)`` of the flange.
+    axis: FloatArray  #: ``(3,)`` unit in base: the way the gel is pressed.
+    search: float  #: m from the stand-off to where the gel would first touch the nominal surface.
+    press: float  #: m to press on after the first touch.
     overtravel: float | None = None
+    """m beyond ``search`` before a touch is given up; None for that of the performer's speeds."""
 
     @classmethod
     def planned(
@@ -129,30 +120,19 @@ class ContactMotion:
 
 @dataclass(frozen=True)
 class Speeds:
-    """How fast the arm may go in each phase of a contact (SI).
+    """How fast the arm may go in each phase of a contact (SI)."""
 
-    Attributes:
-        travel: rad/s of the fastest joint between contacts.
-        travel_acceleration: rad/s^2.
-        approach: m/s within reach of the object.
-        press: m/s once the gel touches.
-        retreat: m/s away from the object.
-        acceleration: m/s^2 of every straight line.
-        touch_force: N that end the search; the press is measured from where half of it was met.
-        press_force: N that end a press into what nobody knows: the housing may have met it, not the gel,
-            which resists less at any depth that is asked for.
-        overtravel: m beyond the nominal surface before a touch is given up.
-    """
-
-    travel: float = 0.9
-    travel_acceleration: float = 1.2
-    approach: float = 0.010
-    press: float = 0.005
-    retreat: float = 0.040
-    acceleration: float = 0.2
-    touch_force: float = 0.3
+    travel: float = 0.9  #: rad/s of the fastest joint between contacts.
+    travel_acceleration: float = 1.2  #: rad/s^2.
+    approach: float = 0.010  #: m/s within reach of the object.
+    press: float = 0.005  #: m/s once the gel touches.
+    retreat: float = 0.040  #: m/s away from the object.
+    acceleration: float = 0.2  #: m/s^2 of every straight line.
+    touch_force: float = 0.3  #: N that end the search; the press is measured from where half of it was met.
     press_force: float = 7.0
-    overtravel: float = 0.008
+    """N that end a press into what nobody knows: the housing may have met it, not the gel, which resists less
+    at any depth that is asked for."""
+    overtravel: float = 0.008  #: m beyond the nominal surface before a touch is given up.
 
 
 class PressPerformer:

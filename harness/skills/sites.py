@@ -34,37 +34,23 @@ _DEAD_ENDS = 20
 
 @dataclass(frozen=True)
 class PressLimits:
-    """What is asked of every contact of a run.
+    """What is asked of every contact of a run."""
 
-    Attributes:
-        longest_step: m from a contact to the next, where steps are close.
-        tilt: rad, the most between the tool and the surface's normal.
-        depth: m of indentation at the gel's centre, from and to.
-    """
-
-    longest_step: float = 25.0e-3
-    tilt: float = float(np.radians(15.0))
-    depth: tuple[float, float] = (0.5e-3, 2.0e-3)
+    longest_step: float = 25.0e-3  #: m from a contact to the next, where steps are close.
+    tilt: float = float(np.radians(15.0))  #: rad, the most between the tool and the surface's normal.
+    depth: tuple[float, float] = (0.5e-3, 2.0e-3)  #: m of indentation at the gel's centre, from and to.
 
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """One planned contact.
-
-    Attributes:
-        base_from_gel: ``(4, 4)``: the gel when it is fully pressed, were the object where the
-            plan believes it to be.
-        press: metres to travel on to there from where the arm notices the touch.
-        penetration: metres that the object then reaches into the gel at most.
-        point_in_object: ``(3,)`` metres: the planned contact.
-        tilt: rad between the tool and the surface's normal.
-    """
+    """One planned contact."""
 
     base_from_gel: FloatArray
-    press: float
-    penetration: float
-    point_in_object: FloatArray
-    tilt: float
+    """``(4, 4)``: the gel when it is fully pressed, were the object where the plan believes it to be."""
+    press: float  #: metres to travel on to there from where the arm notices the touch.
+    penetration: float  #: metres that the object then reaches into the gel at most.
+    point_in_object: FloatArray  #: ``(3,)`` metres: the planned contact.
+    tilt: float  #: rad between the tool and the surface's normal.
 
 
 class Visit(Protocol):

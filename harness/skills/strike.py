@@ -54,21 +54,14 @@ _ARRAYS = ("start_rad", "travel_rad", "base_from_ready", "base_from_firing", "ax
 
 @dataclass(frozen=True, eq=False)
 class StrikeMotion:
-    """One strike, ready to be performed.
+    """One strike, ready to be performed."""
 
-    Attributes:
-        start: ``(6,)`` rad, where the travel was planned to start.
-        travel: ``(n, 6)`` rad, joint way points to where the straight way begins.
-        base_from_ready: ``(4, 4)`` of the flange, there.
-        base_from_firing: ``(4, 4)`` of the flange, the tip at its stand-off from the nominal surface.
-        axis: ``(3,)`` unit in base, the way of the strike.
-    """
-
-    start: FloatArray
-    travel: FloatArray
-    base_from_ready: FloatArray
+    start: FloatArray  #: ``(6,)`` rad, where the travel was planned to start.
+    travel: FloatArray  #: ``(n, 6)`` rad, joint way points to where the straight way begins.
+    base_from_ready: FloatArray  #: ``(4, 4)`` of the flange, there.
     base_from_firing: FloatArray
-    axis: FloatArray
+    """``(4, 4)`` of the flange, the tip at its stand-off from the nominal surface."""
+    axis: FloatArray  #: ``(3,)`` unit in base, the way of the strike.
 
     @classmethod
     def planned(cls, strike: PlannedStrike) -> "StrikeMotion":
@@ -100,15 +93,10 @@ class StrikeMotion:
 
 @dataclass(frozen=True)
 class StrikeSpeeds:
-    """How fast the arm may go near the object (SI).
+    """How fast the arm may go near the object (SI)."""
 
-    Attributes:
-        approach: m/s on the straight way to the object and back.
-        acceleration: m/s^2.
-    """
-
-    approach: float = 0.045
-    acceleration: float = 0.2
+    approach: float = 0.045  #: m/s on the straight way to the object and back.
+    acceleration: float = 0.2  #: m/s^2.
 
 
 def planner(
@@ -136,15 +124,10 @@ def planner(
 
 @dataclass(frozen=True)
 class SearchGuard:
-    """How a way is followed that may end at any place.
+    """How a way is followed that may end at any place."""
 
-    Attributes:
-        speed: m/s.
-        force: N of resistance that end it.
-    """
-
-    speed: float
-    force: float
+    speed: float  #: m/s.
+    force: float  #: N of resistance that end it.
 
 
 def strike(

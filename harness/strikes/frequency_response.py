@@ -80,38 +80,23 @@ _ABOVE_NOISE = 8.0
 
 @dataclass(frozen=True)
 class Blow:
-    """What one blow was. Sigmas are standard deviations by the noise at rest.
+    """What one blow was. Sigmas are standard deviations by the noise at rest."""
 
-    Attributes:
-        peak: N, the greatest force.
-        peak_sigma: N.
-        impulse: N s, of all touches.
-        impulse_sigma: N s.
-        duration: s for which the first touch was above the level asked for.
-        duration_sigma: s.
-        width: s above half the peak.
-        start: s from the first sample, where the first touch crossed the level.
-        touches: how often the force rose to 5 % of its peak, having fallen to half of that before.
-        rest: N that was read with nothing touching, next to the blow, at ``start``.
-        drift: N/s by which the rest changes there.
-        noise: N, standard deviation at rest.
-        clipped: whether the force stayed at one value as only a full scale makes it: peak and impulse
-            are then too small, and nobody knows by how much.
-    """
-
-    peak: float
-    peak_sigma: float
-    impulse: float
-    impulse_sigma: float
-    duration: float
-    duration_sigma: float
-    width: float
-    start: float
-    touches: int
-    rest: float
-    drift: float
-    noise: float
+    peak: float  #: N, the greatest force.
+    peak_sigma: float  #: N.
+    impulse: float  #: N s, of all touches.
+    impulse_sigma: float  #: N s.
+    duration: float  #: s for which the first touch was above the level asked for.
+    duration_sigma: float  #: s.
+    width: float  #: s above half the peak.
+    start: float  #: s from the first sample, where the first touch crossed the level.
+    touches: int  #: how often the force rose to 5 % of its peak, having fallen to half of that before.
+    rest: float  #: N that was read with nothing touching, next to the blow, at ``start``.
+    drift: float  #: N/s by which the rest changes there.
+    noise: float  #: N, standard deviation at rest.
     clipped: bool
+    """whether the force stayed at one value as only a full scale makes it: peak and impulse are then too
+    small, and nobody knows by how much."""
 
     @property
     def double_hit(self) -> bool:
@@ -121,30 +106,19 @@ class Blow:
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
-    """Of one pair of places.
+    """Of one pair of places."""
 
-    Attributes:
-        frequencies: ``(f,)`` Hz, evenly spaced from 0 on.
-        h1: ``(f,)`` response per force.
-        h2: ``(f,)``; zero where the response has nothing in common with the force.
-        coherence: ``(f,)`` from 0 to 1; None of a single blow.
-        sigma: ``(f,)`` standard deviation of ``h1``; None of a single blow.
-        excited: ``(f,)`` whether every force is within ``FORCE_FLOOR`` of its greatest.
-        decay: 1/s of the exponential window, which adds to every mode's damping.
-        blows: in order.
-        notes: sentences about responses that do not fit their blows: late, of opposite sign, of another gain,
-            or with lost samples.
-    """
-
-    frequencies: FloatArray
-    h1: ComplexArray
-    h2: ComplexArray
-    coherence: FloatArray | None
-    sigma: FloatArray | None
-    excited: BoolArray
-    decay: float
-    blows: tuple[Blow, ...]
+    frequencies: FloatArray  #: ``(f,)`` Hz, evenly spaced from 0 on.
+    h1: ComplexArray  #: ``(f,)`` response per force.
+    h2: ComplexArray  #: ``(f,)``; zero where the response has nothing in common with the force.
+    coherence: FloatArray | None  #: ``(f,)`` from 0 to 1; None of a single blow.
+    sigma: FloatArray | None  #: ``(f,)`` standard deviation of ``h1``; None of a single blow.
+    excited: BoolArray  #: ``(f,)`` whether every force is within ``FORCE_FLOOR`` of its greatest.
+    decay: float  #: 1/s of the exponential window, which adds to every mode's damping.
+    blows: tuple[Blow, ...]  #: in order.
     notes: tuple[str, ...] = ()
+    """sentences about responses that do not fit their blows: late, of opposite sign, of another gain, or with
+    lost samples."""
 
     @property
     def band(self) -> tuple[float, float]:

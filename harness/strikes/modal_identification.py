@@ -90,26 +90,17 @@ _MIN_REPEATS = 2
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedMode:
-    """One mode, as measured.
+    """One mode, as measured."""
 
-    Attributes:
-        frequency: Hz, undamped.
-        damping: 1/s.
-        frequency_sigma: Hz, one standard deviation, by what the fit left about the peak.
-        damping_sigma: 1/s.
-        level: dB of its power in the band against the strongest mode's.
-        lines: ``(k, f)`` what it adds to each line of the band.
-        spread: Hz, one standard deviation from row to row of a mode that moved between them; zero of one that
-            all rows have in one place.
-    """
-
-    frequency: float
-    damping: float
-    frequency_sigma: float
-    damping_sigma: float
-    level: float
-    lines: ComplexArray
+    frequency: float  #: Hz, undamped.
+    damping: float  #: 1/s.
+    frequency_sigma: float  #: Hz, one standard deviation, by what the fit left about the peak.
+    damping_sigma: float  #: 1/s.
+    level: float  #: dB of its power in the band against the strongest mode's.
+    lines: ComplexArray  #: ``(k, f)`` what it adds to each line of the band.
     spread: float = 0.0
+    """Hz, one standard deviation from row to row of a mode that moved between them; zero of one that all rows
+    have in one place."""
 
     @property
     def ratio(self) -> float:
@@ -124,27 +115,19 @@ class IdentifiedMode:
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """What was found.
+    """What was found."""
 
-    Attributes:
-        modes: by ascending frequency; each has a damping above zero.
-        undamped: poles that do not decay, likewise: driven from outside, as by the mains, or sharper than the
-            lines tell. No mode of a passive structure.
-        frequencies: ``(f,)`` Hz, of the lines that were fitted.
-        residual: ``(k, f)`` of them that no mode explains.
-        unexplained: share of the lines' power in ``residual``.
-        full: whether more modes stood out than were asked for.
-        clipped: ``(k,)`` channels that read their greatest value again and again: what they say of dampings
-            and of harmonics is not to be trusted.
-    """
-
-    modes: tuple[IdentifiedMode, ...]
+    modes: tuple[IdentifiedMode, ...]  #: by ascending frequency; each has a damping above zero.
     undamped: tuple[IdentifiedMode, ...]
-    frequencies: FloatArray
-    residual: ComplexArray
-    unexplained: float
-    full: bool
+    """poles that do not decay, likewise: driven from outside, as by the mains, or sharper than the lines
+    tell. No mode of a passive structure."""
+    frequencies: FloatArray  #: ``(f,)`` Hz, of the lines that were fitted.
+    residual: ComplexArray  #: ``(k, f)`` of them that no mode explains.
+    unexplained: float  #: share of the lines' power in ``residual``.
+    full: bool  #: whether more modes stood out than were asked for.
     clipped: BoolArray
+    """``(k,)`` channels that read their greatest value again and again: what they say of dampings and of
+    harmonics is not to be trusted."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -308,25 +291,15 @@ def _searched(lines: SpectralLines, search: PoleSearch, rounding: float) -> Iden
 
 @dataclass(frozen=True, eq=False)
 class MovedMode:
-    """One mode for which the fit used several shared poles.
+    """One mode for which the fit used several shared poles."""
 
-    Attributes:
-        members: ``(m,)`` indices of the shared poles.
-        reach: lowest and highest frequency, in rad/s, at which the mode explains a line.
-        omega: mean frequency over the rows in rad/s, weighted by their power.
-        decay: mean damping in 1/s, weighted likewise.
-        omega_sigma: standard deviation of ``omega`` in rad/s.
-        decay_sigma: standard deviation of ``decay`` in 1/s.
-        spread: standard deviation of the frequency from row to row in rad/s; zero where the rows agree.
-    """
-
-    members: IntArray
-    reach: tuple[float, float]
-    omega: float
-    decay: float
-    omega_sigma: float
-    decay_sigma: float
-    spread: float
+    members: IntArray  #: ``(m,)`` indices of the shared poles.
+    reach: tuple[float, float]  #: lowest and highest frequency, in rad/s, at which the mode explains a line.
+    omega: float  #: mean frequency over the rows in rad/s, weighted by their power.
+    decay: float  #: mean damping in 1/s, weighted likewise.
+    omega_sigma: float  #: standard deviation of ``omega`` in rad/s.
+    decay_sigma: float  #: standard deviation of ``decay`` in 1/s.
+    spread: float  #: standard deviation of the frequency from row to row in rad/s; zero where the rows agree.
 
     def contains(self, omega: float) -> bool:
         """Return whether a pole at ``omega`` rad/s belongs to this mode."""
@@ -392,17 +365,11 @@ def _moved_pole(fit: PoleFit, mode: MovedMode) -> IdentifiedMode:
 
 @dataclass(frozen=True, eq=False)
 class _RowPoles:
-    """One pole of each row, fitted to that row alone.
+    """One pole of each row, fitted to that row alone."""
 
-    Attributes:
-        omegas: ``(r,)`` rad/s.
-        decays: ``(r,)`` 1/s.
-        residual: ``(r, f)`` lines that the poles leave.
-    """
-
-    omegas: FloatArray
-    decays: FloatArray
-    residual: ComplexArray
+    omegas: FloatArray  #: ``(r,)`` rad/s.
+    decays: FloatArray  #: ``(r,)`` 1/s.
+    residual: ComplexArray  #: ``(r, f)`` lines that the poles leave.
 
 
 def merge_poles(lines: SpectralLines, fit: PoleFit, search: PoleSearch) -> list[MovedMode]:

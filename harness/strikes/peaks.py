@@ -29,47 +29,30 @@ _LEAST_DECAY = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Peak:
-    """One resonance as all strikes heard it.
+    """One resonance as all strikes heard it."""
 
-    Attributes:
-        frequency: Hz.
-        damping: 1/s, the window's taken off; the scatter of the fit can bring it below zero.
-        y: ``(K,)`` complex: the strikes' shares, of unit length; zero where ``heard`` is false.
-        sigma: ``(K,)`` standard deviation of ``y`` by the noise before the strikes.
-        heard: ``(K,)`` whether the strike excited this frequency.
-        residual: share of the band's energy that is not one waveform.
-        level: dB of its top against the strongest peak's.
-    """
-
-    frequency: float
-    damping: float
-    y: ComplexArray
-    sigma: FloatArray
-    heard: BoolArray
-    residual: float
-    level: float
+    frequency: float  #: Hz.
+    damping: float  #: 1/s, the window's taken off; the scatter of the fit can bring it below zero.
+    y: ComplexArray  #: ``(K,)`` complex: the strikes' shares, of unit length; zero where ``heard`` is false.
+    sigma: FloatArray  #: ``(K,)`` standard deviation of ``y`` by the noise before the strikes.
+    heard: BoolArray  #: ``(K,)`` whether the strike excited this frequency.
+    residual: float  #: share of the band's energy that is not one waveform.
+    level: float  #: dB of its top against the strongest peak's.
 
 
 @dataclass(frozen=True, eq=False)
 class SoundEvidence:
-    """What a run's strikes say.
+    """What a run's strikes say."""
 
-    Attributes:
-        used: ``(K,)`` whether each strike counts.
-        reasons: why each does not; empty where it does.
-        peaks: resonances that are one waveform, by ascending frequency.
-        rejected: peaks that are not, being two modes at once or noise; and echoes' peaks on the skirts
-            of stronger ones.
-        band: Hz, least and greatest frequency that at least two strikes excited; zeros where none.
-        loudest: dB re 1 Pa/N of the strongest peak's top, which the peaks' levels are against.
-    """
-
-    used: BoolArray
-    reasons: tuple[str, ...]
-    peaks: tuple[Peak, ...]
+    used: BoolArray  #: ``(K,)`` whether each strike counts.
+    reasons: tuple[str, ...]  #: why each does not; empty where it does.
+    peaks: tuple[Peak, ...]  #: resonances that are one waveform, by ascending frequency.
     rejected: tuple[Peak, ...]
+    """peaks that are not, being two modes at once or noise; and echoes' peaks on the skirts of stronger
+    ones."""
     band: tuple[float, float]
-    loudest: float = 0.0
+    """Hz, least and greatest frequency that at least two strikes excited; zeros where none."""
+    loudest: float = 0.0  #: dB re 1 Pa/N of the strongest peak's top, which the peaks' levels are against.
 
 
 def analyse(strikes: Sequence[Strike], settings: Analysis | None = None) -> SoundEvidence:

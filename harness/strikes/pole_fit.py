@@ -52,17 +52,11 @@ APART = 8
 
 @dataclass(frozen=True, eq=False)
 class SpectralLines:
-    """Spectral lines of one structure.
+    """Spectral lines of one structure."""
 
-    Attributes:
-        frequencies: ``(f,)`` Hz, evenly spaced, above zero.
-        values: ``(k, f)``, a row a channel.
-        rate: samples per second of the decay that they transform; None of transfer functions.
-    """
-
-    frequencies: FloatArray
-    values: ComplexArray
-    rate: float | None
+    frequencies: FloatArray  #: ``(f,)`` Hz, evenly spaced, above zero.
+    values: ComplexArray  #: ``(k, f)``, a row a channel.
+    rate: float | None  #: samples per second of the decay that they transform; None of transfer functions.
 
     @property
     def step(self) -> float:
@@ -77,21 +71,14 @@ class SpectralLines:
 
 @dataclass(frozen=True, eq=False)
 class PoleFit:
-    """Poles that fit lines best.
+    """Poles that fit lines best."""
 
-    Attributes:
-        omegas: ``(m,)`` rad/s, undamped.
-        decays: ``(m,)`` 1/s.
-        covariance: ``(2 m, 2 m)`` of the relative errors of ``omegas``, then of the decays over ``omegas``.
-        model: ``(m, k, f)`` what each mode adds to each line.
-        residual: ``(k, f)`` what the modes and the skirts leave.
-    """
-
-    omegas: FloatArray
-    decays: FloatArray
+    omegas: FloatArray  #: ``(m,)`` rad/s, undamped.
+    decays: FloatArray  #: ``(m,)`` 1/s.
     covariance: FloatArray
-    model: ComplexArray
-    residual: ComplexArray
+    """``(2 m, 2 m)`` of the relative errors of ``omegas``, then of the decays over ``omegas``."""
+    model: ComplexArray  #: ``(m, k, f)`` what each mode adds to each line.
+    residual: ComplexArray  #: ``(k, f)`` what the modes and the skirts leave.
 
 
 def fit_poles(lines: SpectralLines, omegas: FloatArray, decays: FloatArray, skirt: int) -> PoleFit:
@@ -254,27 +241,17 @@ def _stacked(values: ComplexArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class PoleSearch:
-    """How modes are looked for.
+    """How modes are looked for."""
 
-    Attributes:
-        low: Hz, of the band that is fitted.
-        high: Hz; None for half the rate, or the last line.
-        most: modes at most.
-        false_alarm: chance that noise alone is taken for a mode, in all of the band.
-        misfit: share of a line's power that may stay unexplained without there being another mode.
-        floor_reach: lines to each side over whose median the noise is known.
-        prominence: dB that a peak of the residual stands above what surrounds it.
-        skirt: terms of the polynomial that stands for modes out of the band.
-    """
-
-    low: float = 0.0
-    high: float | None = None
-    most: int = 40
-    false_alarm: float = 1e-3
+    low: float = 0.0  #: Hz, of the band that is fitted.
+    high: float | None = None  #: Hz; None for half the rate, or the last line.
+    most: int = 40  #: modes at most.
+    false_alarm: float = 1e-3  #: chance that noise alone is taken for a mode, in all of the band.
     misfit: float = 0.02
-    floor_reach: int = 100
-    prominence: float = 6.0
-    skirt: int = 3
+    """share of a line's power that may stay unexplained without there being another mode."""
+    floor_reach: int = 100  #: lines to each side over whose median the noise is known.
+    prominence: float = 6.0  #: dB that a peak of the residual stands above what surrounds it.
+    skirt: int = 3  #: terms of the polynomial that stands for modes out of the band.
 
 
 def new_poles(

@@ -19,69 +19,48 @@ _LEAST_NOISE_SAMPLES = 64
 
 @dataclass(frozen=True)
 class Analysis:
-    """How strikes are read.
-
-    Attributes:
-        decay: 1/s of the exponential window, against late reverberation. It is put on the force too:
-            an exponential passes through a convolution, so that it changes no transfer function
-            but by adding to the damping of every mode.
-        duration: s of each strike that are read.
-        before: s before the trigger at which reading begins.
-        pulse: s of force that are read; what the cell shows later is its own noise (ISO 7626-5).
-        force_floor: share of its greatest spectral value below which a force excites nothing: 26 dB
-            against the 20 of ISO 7626-5, because what is too noisy is found out by itself.
-        lowest: Hz; below it are the room and the object rocking on its stand.
-        prominence: dB that a peak stands above its surroundings, and a broad one.
-        range: dB below the highest at which peaks are no longer looked at: what is left there is skirts.
-        above_noise: dB that it stands above what was heard before the strikes.
-        above_floor: dB that it stands above the median about it: between resonances a room's echoes make
-            peaks out of what all modes together answer, seldom 10 dB above their median. And a broad one.
-        broad: Hz between the edges of a peak that is too broad for an echo's.
-        floor_reach: Hz to each side over which that median is taken, at least.
-        edge: share of a peak's power down to which its band reaches.
-        residual: share of a band's energy that may differ from one waveform.
-        skirt: dB that a peak must stand above the skirts of stronger ones, on which a room's echoes make
-            peaks of their own.
-        shared_skirt: the same for a peak whose shares are those of the stronger ones.
-        shared: share of a peak's energy beyond which its shares are its own.
-        most: peaks kept at most, strongest first.
-    """
+    """How strikes are read."""
 
     decay: float = 20.0
-    duration: float = 0.3
-    before: float = 1.0e-3
+    """1/s of the exponential window, against late reverberation. It is put on the force too: an exponential
+    passes through a convolution, so that it changes no transfer function but by adding to the damping of
+    every mode."""
+    duration: float = 0.3  #: s of each strike that are read.
+    before: float = 1.0e-3  #: s before the trigger at which reading begins.
     pulse: float = 4.0e-3
+    """s of force that are read; what the cell shows later is its own noise (ISO 7626-5)."""
     force_floor: float = 0.05
-    lowest: float = 150.0
+    """share of its greatest spectral value below which a force excites nothing: 26 dB against the 20 of ISO
+    7626-5, because what is too noisy is found out by itself."""
+    lowest: float = 150.0  #: Hz; below it are the room and the object rocking on its stand.
     prominence: tuple[float, float] = (6.0, 4.0)
+    """dB that a peak stands above its surroundings, and a broad one."""
     range: float = 45.0
-    above_noise: float = 10.0
+    """dB below the highest at which peaks are no longer looked at: what is left there is skirts."""
+    above_noise: float = 10.0  #: dB that it stands above what was heard before the strikes.
     above_floor: tuple[float, float] = (9.0, 6.0)
-    broad: float = 60.0
-    floor_reach: float = 250.0
-    edge: float = 0.25
-    residual: float = 0.12
+    """dB that it stands above the median about it: between resonances a room's echoes make peaks out of what
+    all modes together answer, seldom 10 dB above their median. And a broad one."""
+    broad: float = 60.0  #: Hz between the edges of a peak that is too broad for an echo's.
+    floor_reach: float = 250.0  #: Hz to each side over which that median is taken, at least.
+    edge: float = 0.25  #: share of a peak's power down to which its band reaches.
+    residual: float = 0.12  #: share of a band's energy that may differ from one waveform.
     skirt: float = 6.0
-    shared_skirt: float = 14.0
-    shared: float = 0.1
-    most: int = 40
+    """dB that a peak must stand above the skirts of stronger ones, on which a room's echoes make peaks of
+    their own."""
+    shared_skirt: float = 14.0  #: the same for a peak whose shares are those of the stronger ones.
+    shared: float = 0.1  #: share of a peak's energy beyond which its shares are its own.
+    most: int = 40  #: peaks kept at most, strongest first.
 
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
-    """Of the strikes that count: rows are strikes, columns frequencies.
+    """Of the strikes that count: rows are strikes, columns frequencies."""
 
-    Attributes:
-        frequencies: ``(F,)`` Hz.
-        transfer: ``(K, F)`` Pa/N, pressure over force; 0 where the force has nothing.
-        excited: ``(K, F)`` whether the force has something.
-        noise: ``(K, F)`` Pa/N expected of what was heard before the strikes.
-    """
-
-    frequencies: FloatArray
-    transfer: ComplexArray
-    excited: BoolArray
-    noise: FloatArray
+    frequencies: FloatArray  #: ``(F,)`` Hz.
+    transfer: ComplexArray  #: ``(K, F)`` Pa/N, pressure over force; 0 where the force has nothing.
+    excited: BoolArray  #: ``(K, F)`` whether the force has something.
+    noise: FloatArray  #: ``(K, F)`` Pa/N expected of what was heard before the strikes.
 
 
 def spectra_of(strikes: Sequence[Strike], settings: Analysis) -> Spectra:

@@ -23,17 +23,11 @@ TIP_LENGTH: Final = 0.02  # m, from the tip at rest back to the solenoid
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One convex body that moves with a link.
+    """One convex body that moves with a link."""
 
-    Attributes:
-        name: as refusals name it.
-        link: 0 for what stands still, else the joint it moves with.
-        vertices: ``(n, 3)`` m in the frame of that joint.
-    """
-
-    name: str
-    link: int
-    vertices: FloatArray
+    name: str  #: as refusals name it.
+    link: int  #: 0 for what stands still, else the joint it moves with.
+    vertices: FloatArray  #: ``(n, 3)`` m in the frame of that joint.
 
 
 def link_from_previous(table: ArmTable, joint: int) -> FloatArray:

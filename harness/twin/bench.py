@@ -33,18 +33,12 @@ _GEL, _FOAM, _OBJECT = (0.9, 0.75, 0.3, 1.0), (0.3, 0.33, 0.4, 1.0), (0.8, 0.35,
 
 @dataclass(frozen=True)
 class Hit:
-    """Two bodies nearer than they may be.
+    """Two bodies nearer than they may be."""
 
-    Attributes:
-        first: name of the body that moves more.
-        second: name of the other.
-        gap: m between them; negative where they overlap. Of convex hulls, so for the object
-            a lower bound.
-    """
-
-    first: str
-    second: str
+    first: str  #: name of the body that moves more.
+    second: str  #: name of the other.
     gap: float
+    """m between them; negative where they overlap. Of convex hulls, so for the object a lower bound."""
 
     def __str__(self) -> str:
         """In words, with the gap in millimetres."""
@@ -57,15 +51,10 @@ class Hit:
 
 @dataclass(frozen=True, eq=False)
 class Near:
-    """Pairs of bodies within sight of each other in one posture.
+    """Pairs of bodies within sight of each other in one posture."""
 
-    Attributes:
-        pairs: ``(n, 2)`` indices of parts, the one nearer the arm's root first.
-        gaps: ``(n,)`` m.
-    """
-
-    pairs: IntArray
-    gaps: FloatArray
+    pairs: IntArray  #: ``(n, 2)`` indices of parts, the one nearer the arm's root first.
+    gaps: FloatArray  #: ``(n,)`` m.
 
 
 class TwinBench:

@@ -13,30 +13,19 @@ from harness.twin.rehearsal import PredictedContact, contact_point
 
 @dataclass(frozen=True, eq=False)
 class ArmDeviation:
-    """The controller's flange poses against the twin's, for the same joints.
+    """The controller's flange poses against the twin's, for the same joints."""
 
-    Attributes:
-        distances: ``(n,)`` m.
-        angles: ``(n,)`` rad.
-    """
-
-    distances: FloatArray
-    angles: FloatArray
+    distances: FloatArray  #: ``(n,)`` m.
+    angles: FloatArray  #: ``(n,)`` rad.
 
 
 @dataclass(frozen=True, eq=False)
 class ContactDeviation:
-    """One contact as performed, against the rehearsed one.
+    """One contact as performed, against the rehearsed one."""
 
-    Attributes:
-        step: of the experiment.
-        point_in_object: ``(3,)`` m, where the recorded pose meets the nominal object.
-        distance: m between that and the rehearsed point.
-    """
-
-    step: int
-    point_in_object: FloatArray
-    distance: float
+    step: int  #: of the experiment.
+    point_in_object: FloatArray  #: ``(3,)`` m, where the recorded pose meets the nominal object.
+    distance: float  #: m between that and the rehearsed point.
 
 
 def compare_arm(model: str, joints: FloatArray, base_from_flange: FloatArray) -> ArmDeviation:

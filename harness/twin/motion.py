@@ -25,38 +25,23 @@ _FARTHER: Final = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Approach:
-    """One branch that reaches a contact.
+    """One branch that reaches a contact."""
 
-    Attributes:
-        base_from_gel: ``(4, 4)``, fully pressed.
-        stand_off_joints: ``(6,)`` rad, before the approach.
-        pressed_joints: ``(6,)`` rad.
-    """
-
-    base_from_gel: FloatArray
-    stand_off_joints: FloatArray
-    pressed_joints: FloatArray
+    base_from_gel: FloatArray  #: ``(4, 4)``, fully pressed.
+    stand_off_joints: FloatArray  #: ``(6,)`` rad, before the approach.
+    pressed_joints: FloatArray  #: ``(6,)`` rad.
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedContact:
-    """A contact with every motion to and from it.
+    """A contact with every motion to and from it."""
 
-    Attributes:
-        start: ``(6,)`` rad, where the travel starts.
-        travel: ``(n, 6)`` rad, joint motions; the last is the stand-off. Empty if it starts there.
-        base_from_stand_off: ``(4, 4)`` of the flange.
-        base_from_pressed: ``(4, 4)`` of the flange.
-        pressed_joints: ``(6,)`` rad.
-        stand_off: m from there to the press.
-    """
-
-    start: FloatArray
-    travel: FloatArray
-    base_from_stand_off: FloatArray
-    base_from_pressed: FloatArray
-    pressed_joints: FloatArray
-    stand_off: float
+    start: FloatArray  #: ``(6,)`` rad, where the travel starts.
+    travel: FloatArray  #: ``(n, 6)`` rad, joint motions; the last is the stand-off. Empty if it starts there.
+    base_from_stand_off: FloatArray  #: ``(4, 4)`` of the flange.
+    base_from_pressed: FloatArray  #: ``(4, 4)`` of the flange.
+    pressed_joints: FloatArray  #: ``(6,)`` rad.
+    stand_off: float  #: m from there to the press.
 
     @property
     def stand_off_joints(self) -> FloatArray:

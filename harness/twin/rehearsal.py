@@ -21,61 +21,36 @@ TOOL_LENGTH: Final = 0.12  # m behind the gel from where the line of a contact i
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """One motion of a plan.
+    """One motion of a plan."""
 
-    Attributes:
-        step: of the experiment, counted from 0.
-        label: what it is for: ``"travel"``, ``"press"``, ``"retreat"``.
-        kind: a straight line of the joints, or of the flange.
-        start: ``(6,)`` rad.
-        end: ``(6,)`` rad for joints, ``(4, 4)`` base_from_flange for a line.
-        touches: whether the gel may touch the object on the way.
-        press: whether the line is meant to end with the gel pressed into the object.
-    """
-
-    step: int
-    label: str
-    kind: Literal["joint", "line"]
-    start: FloatArray
-    end: FloatArray
-    touches: bool = False
-    press: bool = False
+    step: int  #: of the experiment, counted from 0.
+    label: str  #: what it is for: ``"travel"``, ``"press"``, ``"retreat"``.
+    kind: Literal["joint", "line"]  #: a straight line of the joints, or of the flange.
+    start: FloatArray  #: ``(6,)`` rad.
+    end: FloatArray  #: ``(6,)`` rad for joints, ``(4, 4)`` base_from_flange for a line.
+    touches: bool = False  #: whether the gel may touch the object on the way.
+    press: bool = False  #: whether the line is meant to end with the gel pressed into the object.
 
 
 @dataclass(frozen=True, eq=False)
 class PredictedContact:
-    """Where a press would meet the object, were it where the scene says.
+    """Where a press would meet the object, were it where the scene says."""
 
-    Attributes:
-        step: of the experiment.
-        base_from_gel: ``(4, 4)``, fully pressed.
-        point_in_object: ``(3,)`` m.
-        centre_depth: m of indentation at the gel's centre; negative where it does not touch.
-        pad_depth: m of the deepest indentation anywhere on the pad.
-    """
-
-    step: int
-    base_from_gel: FloatArray
-    point_in_object: FloatArray
-    centre_depth: float
-    pad_depth: float
+    step: int  #: of the experiment.
+    base_from_gel: FloatArray  #: ``(4, 4)``, fully pressed.
+    point_in_object: FloatArray  #: ``(3,)`` m.
+    centre_depth: float  #: m of indentation at the gel's centre; negative where it does not touch.
+    pad_depth: float  #: m of the deepest indentation anywhere on the pad.
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why one segment must not be performed.
+    """Why one segment must not be performed."""
 
-    Attributes:
-        step: of the experiment.
-        label: of the segment.
-        reason: in words, with values and limits.
-        bodies: pairs that would meet.
-    """
-
-    step: int
-    label: str
-    reason: str
-    bodies: tuple[tuple[str, str], ...] = ()
+    step: int  #: of the experiment.
+    label: str  #: of the segment.
+    reason: str  #: in words, with values and limits.
+    bodies: tuple[tuple[str, str], ...] = ()  #: pairs that would meet.
 
     def __str__(self) -> str:
         """Step, counted from 1 as an operator does, then the reason."""
@@ -84,19 +59,12 @@ class Refusal:
 
 @dataclass(frozen=True)
 class RehearsalReport:
-    """What a rehearsal found.
+    """What a rehearsal found."""
 
-    Attributes:
-        segments: number of motions gone through.
-        refusals: motions that must not be performed, at most one a segment.
-        warnings: sentences.
-        contacts: of the presses that were not refused.
-    """
-
-    segments: int
-    refusals: tuple[Refusal, ...]
-    warnings: tuple[str, ...]
-    contacts: tuple[PredictedContact, ...]
+    segments: int  #: number of motions gone through.
+    refusals: tuple[Refusal, ...]  #: motions that must not be performed, at most one a segment.
+    warnings: tuple[str, ...]  #: sentences.
+    contacts: tuple[PredictedContact, ...]  #: of the presses that were not refused.
 
     def require(self) -> "RehearsalReport":
         """This report.

@@ -23,23 +23,14 @@ YAWS: Final = 16  # turns about the strike that are looked at: the hammer is rou
 
 @dataclass(frozen=True, eq=False)
 class PlannedStrike:
-    """A strike with every motion to and from it.
+    """A strike with every motion to and from it."""
 
-    Attributes:
-        start: ``(6,)`` rad, where the travel starts.
-        travel: ``(n, 6)`` rad, joint motions; the last is where the straight way begins.
-        base_from_ready: ``(4, 4)`` of the flange, there.
-        base_from_firing: ``(4, 4)`` of the flange, the tip at its stand-off from the surface.
-        firing_joints: ``(6,)`` rad.
-        axis: ``(3,)`` unit in base, the way of the strike.
-    """
-
-    start: FloatArray
-    travel: FloatArray
-    base_from_ready: FloatArray
-    base_from_firing: FloatArray
-    firing_joints: FloatArray
-    axis: FloatArray
+    start: FloatArray  #: ``(6,)`` rad, where the travel starts.
+    travel: FloatArray  #: ``(n, 6)`` rad, joint motions; the last is where the straight way begins.
+    base_from_ready: FloatArray  #: ``(4, 4)`` of the flange, there.
+    base_from_firing: FloatArray  #: ``(4, 4)`` of the flange, the tip at its stand-off from the surface.
+    firing_joints: FloatArray  #: ``(6,)`` rad.
+    axis: FloatArray  #: ``(3,)`` unit in base, the way of the strike.
 
     @property
     def ready_joints(self) -> FloatArray:

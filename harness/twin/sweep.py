@@ -18,15 +18,10 @@ GREATEST_JUMP: Final = 0.3  # rad of a joint from one step of a line to the next
 
 @dataclass(frozen=True)
 class Blocked:
-    """Where a motion first hits something.
+    """Where a motion first hits something."""
 
-    Attributes:
-        share: of the motion done by then, 0 to 1.
-        hits: what is hit.
-    """
-
-    share: float
-    hits: tuple[Hit, ...]
+    share: float  #: of the motion done by then, 0 to 1.
+    hits: tuple[Hit, ...]  #: what is hit.
 
 
 def sweep(bench: TwinBench, start: FloatArray, end: FloatArray) -> Blocked | None:

@@ -15,16 +15,11 @@ from harness.basics.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class ConvexBody:
-    """A convex body as its corners and its faces' planes, in its own frame.
+    """A convex body as its corners and its faces' planes, in its own frame."""
 
-    Attributes:
-        vertices: ``(n, 3)`` m.
-        planes: ``(m, 4)``: unit outward normal and offset; a point inside has
-            ``normal . point + offset <= 0``.
-    """
-
-    vertices: FloatArray
+    vertices: FloatArray  #: ``(n, 3)`` m.
     planes: FloatArray
+    """``(m, 4)``: unit outward normal and offset; a point inside has ``normal . point + offset <= 0``."""
 
     @classmethod
     def of_points(cls, vertices: FloatArray) -> "ConvexBody":

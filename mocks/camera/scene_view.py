@@ -16,17 +16,11 @@ _BACKGROUND = (30, 34, 40)
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """One body of the scene.
+    """One body of the scene."""
 
-    Attributes:
-        mesh: in the body's own frame.
-        base_from_body: ``(4, 4)``.
-        colour: RGB, 0 to 255.
-    """
-
-    mesh: Mesh
-    base_from_body: FloatArray
-    colour: tuple[int, int, int]
+    mesh: Mesh  #: in the body's own frame.
+    base_from_body: FloatArray  #: ``(4, 4)``.
+    colour: tuple[int, int, int]  #: RGB, 0 to 255.
 
 
 class SceneView:

@@ -33,21 +33,13 @@ _INFO_QUESTIONS = range(10)
 
 @dataclass(frozen=True)
 class MockedBoxModel:
-    """What one model of the family is.
+    """What one model of the family is."""
 
-    Attributes:
-        name: product number, as ``info 1`` states it.
-        bits: of its converter; fewer than 16 leave it left-justified in 16.
-        dividend: Hz; the scan list's rate is this over the divisor of ``srate``.
-        divisors: that ``srate`` takes, least and greatest.
-        decimates: whether it has ``dec`` and ``deca``.
-    """
-
-    name: str
-    bits: int
-    dividend: int
-    divisors: tuple[int, int]
-    decimates: bool
+    name: str  #: product number, as ``info 1`` states it.
+    bits: int  #: of its converter; fewer than 16 leave it left-justified in 16.
+    dividend: int  #: Hz; the scan list's rate is this over the divisor of ``srate``.
+    divisors: tuple[int, int]  #: that ``srate`` takes, least and greatest.
+    decimates: bool  #: whether it has ``dec`` and ``deca``.
 
 
 MODELS = {
@@ -68,15 +60,11 @@ class CommandInterpreter:
         model: of ``MODELS``.
         serial: as ``info 6`` states it.
         echoes_start: whether the echo of ``start`` comes in front of the data; firmwares differ.
-
-    Attributes:
-        scanning: whether samples are being taken.
-        scan_list: inputs, by slot.
     """
 
     def __init__(self, model: MockedBoxModel, serial: str, echoes_start: bool = False) -> None:
-        self.scanning = False
-        self.scan_list: list[int] = [0]
+        self.scanning = False  #: whether samples are being taken.
+        self.scan_list: list[int] = [0]  #: inputs, by slot.
         self._model = model
         self._serial = serial
         self._echoes_start = echoes_start
@@ -187,9 +175,6 @@ class DaqBox:
         memory: bytes of its own.
         host_memory: bytes that the host's system keeps for a program that does not fetch them.
         echoes_start: whether the echo of ``start`` comes in front of the data.
-
-    Attributes:
-        port: path of the device file that a driver opens.
     """
 
     def __init__(
@@ -220,7 +205,7 @@ class DaqBox:
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
-        self.port = os.ttyname(self._slave)
+        self.port = os.ttyname(self._slave)  #: path of the device file that a driver opens.
 
     @property
     def lost(self) -> int:

@@ -14,21 +14,13 @@ from mocks.world.sound import StrikeTruth, WorldSound
 
 @dataclass(frozen=True)
 class Wiring:
-    """How newtons and pascals become counts: the truth, which a calibration only approximates.
+    """How newtons and pascals become counts: the truth, which a calibration only approximates."""
 
-    Attributes:
-        counts_per_newton: cell, conditioner and converter.
-        counts_per_pascal: the same of the microphone.
-        offsets: counts of (hammer, microphone) at rest.
-        noise: counts rms of (hammer, microphone).
-        full_scale: greatest count; beyond it the converter stays there.
-    """
-
-    counts_per_newton: float
-    counts_per_pascal: float
-    offsets: tuple[float, float]
-    noise: tuple[float, float]
-    full_scale: int = 2**15 - 1
+    counts_per_newton: float  #: cell, conditioner and converter.
+    counts_per_pascal: float  #: the same of the microphone.
+    offsets: tuple[float, float]  #: counts of (hammer, microphone) at rest.
+    noise: tuple[float, float]  #: counts rms of (hammer, microphone).
+    full_scale: int = 2**15 - 1  #: greatest count; beyond it the converter stays there.
 
     def counts(self, force: FloatArray, pressure: FloatArray, noise: np.random.Generator) -> AnyArray:
         """Counts of one record.

@@ -17,17 +17,11 @@ from mocks.world.world import World
 
 @dataclass
 class Stage:
-    """Where a run is in time and in its plan.
+    """Where a run is in time and in its plan."""
 
-    Attributes:
-        time: s on the simulated bench clock.
-        step: of the run; -1 before the first.
-        sample: of the step; -1 before the first.
-    """
-
-    time: float = 0.0
-    step: int = -1
-    sample: int = -1
+    time: float = 0.0  #: s on the simulated bench clock.
+    step: int = -1  #: of the run; -1 before the first.
+    sample: int = -1  #: of the step; -1 before the first.
 
     def pause(self, seconds: float) -> None:
         """Let simulated time pass."""
@@ -63,15 +57,10 @@ class _Piece:
 
 @dataclass(frozen=True, eq=False)
 class Rise:
-    """A tool digital output that was switched on.
+    """A tool digital output that was switched on."""
 
-    Attributes:
-        output: 0 or 1.
-        base_from_flange: ``(4, 4)``, where the flange was.
-    """
-
-    output: int
-    base_from_flange: FloatArray
+    output: int  #: 0 or 1.
+    base_from_flange: FloatArray  #: ``(4, 4)``, where the flange was.
 
 
 class InProcessArm:
@@ -83,10 +72,6 @@ class InProcessArm:
         world: pushes back.
         stage: simulated time, and the step whose errors apply.
         rate: packets a second of the history.
-
-    Attributes:
-        outputs: of the tool.
-        rises: outputs switched on so far, in order.
     """
 
     def __init__(
@@ -97,8 +82,8 @@ class InProcessArm:
         self._stage = stage
         self._rate = rate
         self._zero = np.zeros(6)
-        self.outputs: dict[int, bool] = {}
-        self.rises: list[Rise] = []
+        self.outputs: dict[int, bool] = {}  #: of the tool.
+        self.rises: list[Rise] = []  #: outputs switched on so far, in order.
         resting = np.array(joints, dtype=np.float64)
         self._pieces = [_Piece(stage.time, stage.time, lambda _: resting)]
 

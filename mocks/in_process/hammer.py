@@ -18,19 +18,12 @@ _REST = 2500
 
 @dataclass(frozen=True, eq=False)
 class Fired:
-    """The newest firing.
+    """The newest firing."""
 
-    Attributes:
-        time: s on the simulated bench clock.
-        base_from_flange: ``(4, 4)``, where the flange was.
-        step: of the run.
-        sample: of the step.
-    """
-
-    time: float
-    base_from_flange: FloatArray
-    step: int
-    sample: int
+    time: float  #: s on the simulated bench clock.
+    base_from_flange: FloatArray  #: ``(4, 4)``, where the flange was.
+    step: int  #: of the run.
+    sample: int  #: of the step.
 
 
 class InProcessHammer:
@@ -42,9 +35,6 @@ class InProcessHammer:
         output: which of the tool's.
         stage: simulated time, step and sample.
         section: of the station: rate, threshold, calibration.
-
-    Attributes:
-        fired: what was struck last, for a microphone of its own; None where the last capture had no blow.
     """
 
     def __init__(
@@ -61,6 +51,7 @@ class InProcessHammer:
         self._identity = f"{section.model} {section.serial} in process"
         self._idle = strikes.idle()
         self.fired: Fired | None = None
+        """what was struck last, for a microphone of its own; None where the last capture had no blow."""
 
     def open(self) -> None:
         """Nothing to connect."""

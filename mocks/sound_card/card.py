@@ -137,13 +137,9 @@ class SoundCard:
         channels: 1 or 2.
         quantum: samples that PipeWire hands over at a time; a busy computer is late for small ones.
         under: folder in which the card's own is made; None for the system's.
-
-    Attributes:
-        microphone: its name among PortAudio's devices.
-        environment: what a process that opens it must have in its environment.
     """
 
-    microphone = MICROPHONE
+    microphone = MICROPHONE  #: its name among PortAudio's devices.
 
     def __init__(
         self, rate: int = 48000, channels: int = 1, quantum: int = 2048, under: Path | None = None
@@ -152,7 +148,7 @@ class SoundCard:
             raise ValueError(f"a mocked sound card has 1 or 2 channels, not {channels}")
         self.rate = rate
         self.channels = channels
-        self.environment: dict[str, str] = {}
+        self.environment: dict[str, str] = {}  #: what a process that opens it must have in its environment.
         self._quantum = quantum
         self._under = under
         self._folder: Path | None = None

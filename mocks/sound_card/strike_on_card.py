@@ -23,17 +23,11 @@ NOISE = -110.0
 
 @dataclass(frozen=True)
 class CardConverter:
-    """A converter as it is, which a calibration only approximates.
+    """A converter as it is, which a calibration only approximates."""
 
-    Attributes:
-        counts_per_pascal: of microphone, preamplifier and converter.
-        offset: counts at rest.
-        full_scale: greatest count; beyond it the converter stays there.
-    """
-
-    counts_per_pascal: float
-    offset: float
-    full_scale: int
+    counts_per_pascal: float  #: of microphone, preamplifier and converter.
+    offset: float  #: counts at rest.
+    full_scale: int  #: greatest count; beyond it the converter stays there.
 
     @classmethod
     def of(cls, calibration: AcquisitionCalibration) -> "CardConverter":
@@ -61,21 +55,13 @@ _IDLE = 2.0
 
 @dataclass(frozen=True)
 class Wire:
-    """How a sound card is wired.
+    """How a sound card is wired."""
 
-    Attributes:
-        rate: samples a second.
-        channels: of the card.
-        channel: with the microphone.
-        converter: of that channel.
-        sound_rate: Hz, at which the world makes its sound.
-    """
-
-    rate: int
-    channels: int
-    channel: int
-    converter: CardConverter
-    sound_rate: float
+    rate: int  #: samples a second.
+    channels: int  #: of the card.
+    channel: int  #: with the microphone.
+    converter: CardConverter  #: of that channel.
+    sound_rate: float  #: Hz, at which the world makes its sound.
 
     def samples(self, pressure: FloatArray, noise: np.random.Generator) -> AnyArray:
         """``(n, channels)`` int32 of ``(t,)`` Pa: their upper bits are the converter's counts."""

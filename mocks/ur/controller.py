@@ -36,11 +36,6 @@ class Player:
         robot: what they act on.
         builtins: what they may call.
         complain: is told in words why a program ended.
-
-    Attributes:
-        state: of the main program.
-        name: of the main program, the last one where none runs.
-        listeners: are called with ``"STARTED"`` or ``"STOPPED"`` and the name of a main program.
     """
 
     def __init__(
@@ -52,9 +47,10 @@ class Player:
         self._cache: dict[str, Program] = {}
         self._main: Process | None = None
         self._secondary: list[Process] = []
-        self.state = RuntimeState.STOPPED
-        self.name = ""
+        self.state = RuntimeState.STOPPED  #: of the main program.
+        self.name = ""  #: of the main program, the last one where none runs.
         self.listeners: list[Callable[[str, str], None]] = []
+        """are called with ``"STARTED"`` or ``"STOPPED"`` and the name of a main program."""
 
     def translate(self, text: str) -> Program:
         """A program's functions; slow, so not for the controller's cycle. The newest texts are remembered.
@@ -148,10 +144,6 @@ class Controller:
         on_cycle: is told where the arm is, once a cycle.
         step: of the run, asked where a motion starts; keys the force sensor's noise.
         on_outputs: is told when a digital output changes.
-
-    Attributes:
-        robot: its state.
-        player: its program.
     """
 
     def __init__(
@@ -162,9 +154,9 @@ class Controller:
         step: Callable[[], int] = lambda: 0,
         on_outputs: OnOutputs | None = None,
     ) -> None:
-        self.robot = Robot(config)
+        self.robot = Robot(config)  #: its state.
         builtins = Functions(self.robot, self.protective_stop).table()
-        self.player = Player(self.robot, builtins, self.complain)
+        self.player = Player(self.robot, builtins, self.complain)  #: its program.
         self._contact = contact
         self._on_cycle = on_cycle
         self._on_outputs = on_outputs

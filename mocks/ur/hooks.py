@@ -58,35 +58,25 @@ class Cue(Protocol):
 class ControllerConfig:
     """One mocked controller.
 
-    Attributes:
-        host: the loopback address that its ports are bound to.
-        model: ``"ur3e"``, ``"ur5e"`` or ``"ur10e"``.
-        joints: rad at power-on.
-        serial: of the arm, digits; a real arm's begins with its year of making, a mock's with 0000.
-        polyscope: the software version it reports, (major, minor, bugfix, build).
-        seed: of the force sensor's bias and noise.
-        force_noise: N, standard deviation of each force reading.
-        torque_noise: N m, standard deviation of each torque reading.
-        force_bias: N, standard deviation from which each axis' constant offset is drawn; torques have
-            a tenth of it, in N m.
-        contact_force: N against the direction of motion at which ``tool_contact`` says contact.
-        remote: whether the pendant is in remote control.
-
     Raises:
         WrongUse: ``host`` is not a loopback address.
     """
 
-    host: str
-    model: str = "ur5e"
-    joints: Six = HOME
+    host: str  #: the loopback address that its ports are bound to.
+    model: str = "ur5e"  #: ``"ur3e"``, ``"ur5e"`` or ``"ur10e"``.
+    joints: Six = HOME  #: rad at power-on.
     serial: str = "00005500001"
+    """of the arm, digits; a real arm's begins with its year of making, a mock's with 0000."""
     polyscope: tuple[int, int, int, int] = (5, 12, 4, 1101661)
-    seed: int = 0
-    force_noise: float = 0.05
-    torque_noise: float = 0.002
+    """the software version it reports, (major, minor, bugfix, build)."""
+    seed: int = 0  #: of the force sensor's bias and noise.
+    force_noise: float = 0.05  #: N, standard deviation of each force reading.
+    torque_noise: float = 0.002  #: N m, standard deviation of each torque reading.
     force_bias: float = 1.0
-    contact_force: float = 3.0
-    remote: bool = True
+    """N, standard deviation from which each axis' constant offset is drawn; torques have a tenth of it, in N
+    m."""
+    contact_force: float = 3.0  #: N against the direction of motion at which ``tool_contact`` says contact.
+    remote: bool = True  #: whether the pendant is in remote control.
 
     def __post_init__(self) -> None:
         require_own_address(self.host)

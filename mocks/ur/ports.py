@@ -171,13 +171,10 @@ class ScriptServer:
     """Runs the programs that arrive as text, in order of arrival.
 
     Translation takes some tens of milliseconds and happens in a worker thread, so that the cycle goes on.
-
-    Attributes:
-        connections: open ones.
     """
 
     def __init__(self, controller: Controller) -> None:
-        self.connections: set[ScriptConnection] = set()
+        self.connections: set[ScriptConnection] = set()  #: open ones.
         self._controller = controller
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="translate")
         self._tasks: set[asyncio.Task[None]] = set()

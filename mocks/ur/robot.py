@@ -43,21 +43,13 @@ _BITS: Final = {
 
 @dataclass
 class Safety:
-    """The safety system's state.
+    """The safety system's state."""
 
-    Attributes:
-        mode: what it does.
-        power: of the arm.
-        button: whether an emergency stop button is pressed.
-        cause: of the last stop, in words.
-        stopped_at: s on the controller's clock.
-    """
-
-    mode: SafetyMode = SafetyMode.NORMAL
-    power: RobotMode = RobotMode.RUNNING
-    button: bool = False
-    cause: str = ""
-    stopped_at: float = 0.0
+    mode: SafetyMode = SafetyMode.NORMAL  #: what it does.
+    power: RobotMode = RobotMode.RUNNING  #: of the arm.
+    button: bool = False  #: whether an emergency stop button is pressed.
+    cause: str = ""  #: of the last stop, in words.
+    stopped_at: float = 0.0  #: s on the controller's clock.
 
     @property
     def bits(self) -> int:
@@ -121,19 +113,12 @@ class Bank:
 
 @dataclass
 class Outputs:
-    """Digital and analog outputs, and the speed slider.
+    """Digital and analog outputs, and the speed slider."""
 
-    Attributes:
-        digital: bits 0 to 7 standard, 8 to 15 configurable, 16 and 17 at the tool.
-        analog: two shares of full scale.
-        analog_types: bit of each: volts rather than current.
-        slider: share of the programmed speed, 0 to 1.
-    """
-
-    digital: int = 0
-    analog: list[float] = field(default_factory=lambda: [0.0, 0.0])
-    analog_types: int = 0
-    slider: float = 1.0
+    digital: int = 0  #: bits 0 to 7 standard, 8 to 15 configurable, 16 and 17 at the tool.
+    analog: list[float] = field(default_factory=lambda: [0.0, 0.0])  #: two shares of full scale.
+    analog_types: int = 0  #: bit of each: volts rather than current.
+    slider: float = 1.0  #: share of the programmed speed, 0 to 1.
 
     def apply(self, sent: Mapping[str, Any]) -> None:
         """What a client sent: of each value, only what its mask names; the rest may be garbage."""
@@ -161,17 +146,11 @@ _DIGITAL: Final = {
 
 @dataclass(frozen=True)
 class RegisterWatchdog:
-    """An input that a client must keep writing.
+    """An input that a client must keep writing."""
 
-    Attributes:
-        variable: name of the input.
-        period: s, the longest between two writes.
-        action: ``"pause"``, ``"stop"`` or ``"ignore"``.
-    """
-
-    variable: str
-    period: float
-    action: str
+    variable: str  #: name of the input.
+    period: float  #: s, the longest between two writes.
+    action: str  #: ``"pause"``, ``"stop"`` or ``"ignore"``.
 
 
 BOOTED: Final = 100.0
@@ -194,15 +173,6 @@ class Robot:
 
     Args:
         config: of the controller.
-
-    Attributes:
-        cycles: since power-on.
-        inputs: registers written by clients.
-        results: registers written by programs.
-        written: cycle at which each input was last written by a client.
-        thread: number of the program's thread that runs now; below zero for a secondary program.
-        remote: whether the pendant is in remote control.
-        log: newest lines of ``textmsg`` and of errors.
     """
 
     def __init__(self, config: ControllerConfig) -> None:
@@ -211,17 +181,17 @@ class Robot:
         self.mover = Mover(self.arm, config.joints)
         self.force = ForceSensor(config)
         self.safety = Safety()
-        self.inputs = Bank()
-        self.results = Bank()
+        self.inputs = Bank()  #: registers written by clients.
+        self.results = Bank()  #: registers written by programs.
         self.outputs = Outputs()
         self.payload = Payload()
         self.gravity = [0.0, 0.0, 9.82]
         self.watchdog: RegisterWatchdog | None = None
-        self.written: dict[str, int] = {}
-        self.remote = config.remote
-        self.thread = 0
-        self.cycles = 0
-        self.log: deque[str] = deque(maxlen=LOG_LENGTH)
+        self.written: dict[str, int] = {}  #: cycle at which each input was last written by a client.
+        self.remote = config.remote  #: whether the pendant is in remote control.
+        self.thread = 0  #: number of the program's thread that runs now; below zero for a secondary program.
+        self.cycles = 0  #: since power-on.
+        self.log: deque[str] = deque(maxlen=LOG_LENGTH)  #: newest lines of ``textmsg`` and of errors.
 
     @property
     def time(self) -> float:

@@ -158,19 +158,14 @@ class InputRecipe:
 
 
 class RtdeServer:
-    """All clients of the port.
-
-    Attributes:
-        frozen: whether nothing is sent or read, as where a cable hangs loose.
-        refusing: whether new connections are dropped at once.
-    """
+    """All clients of the port."""
 
     def __init__(self, controller: Controller) -> None:
         self.controller = controller
         self.claims: dict[str, RtdeConnection] = {}
-        self.refusing = False
+        self.refusing = False  #: whether new connections are dropped at once.
         self.connections: set[RtdeConnection] = set()
-        self.frozen = False
+        self.frozen = False  #: whether nothing is sent or read, as where a cable hangs loose.
 
     def freeze(self, frozen: bool) -> None:
         """Send and read nothing, or go on."""

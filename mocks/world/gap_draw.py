@@ -29,31 +29,18 @@ _SHADING_SHARE = 0.15
 
 @dataclass(frozen=True, eq=False)
 class RunDraw:
-    """What differs from nominal for a whole run.
+    """What differs from nominal for a whole run."""
 
-    Attributes:
-        position: ``(3,)`` metres, of the object in base.
-        yaw: rad, of the object about the vertical.
-        tilt: ``(2,)`` rad, of the object about base x and y.
-        sensor_tilt: ``(2,)`` rad, of the gel about its x and y.
-        image_yaw: rad, of the gel about its z.
-        gel_centre: ``(3,)`` metres, of the gel in its nominal frame.
-        pitch: length of gel that a pixel shows from column to column, over its nominal length.
-        aspect: a pixel's height over its width.
-        height_gain: true indentation over what the calibration's gel would show.
-        scale: true size of the object over its nominal size.
-    """
-
-    position: FloatArray
-    yaw: float
-    tilt: FloatArray
-    sensor_tilt: FloatArray
-    image_yaw: float
-    gel_centre: FloatArray
-    pitch: float
-    aspect: float
-    height_gain: float
-    scale: float
+    position: FloatArray  #: ``(3,)`` metres, of the object in base.
+    yaw: float  #: rad, of the object about the vertical.
+    tilt: FloatArray  #: ``(2,)`` rad, of the object about base x and y.
+    sensor_tilt: FloatArray  #: ``(2,)`` rad, of the gel about its x and y.
+    image_yaw: float  #: rad, of the gel about its z.
+    gel_centre: FloatArray  #: ``(3,)`` metres, of the gel in its nominal frame.
+    pitch: float  #: length of gel that a pixel shows from column to column, over its nominal length.
+    aspect: float  #: a pixel's height over its width.
+    height_gain: float  #: true indentation over what the calibration's gel would show.
+    scale: float  #: true size of the object over its nominal size.
 
     @property
     def object_rotation(self) -> FloatArray:
@@ -70,19 +57,12 @@ class RunDraw:
 
 @dataclass(frozen=True, eq=False)
 class ContactDraw:
-    """What differs for one contact.
+    """What differs for one contact."""
 
-    Attributes:
-        arm_error: ``(3,)`` metres in base, of the flange against what is reported.
-        along_tool: metres, in addition, along the tool.
-        gel_rotation: ``(3, 3)``, of the gel in its own frame.
-        height_offset: metres of indentation.
-    """
-
-    arm_error: FloatArray
-    along_tool: float
-    gel_rotation: FloatArray
-    height_offset: float
+    arm_error: FloatArray  #: ``(3,)`` metres in base, of the flange against what is reported.
+    along_tool: float  #: metres, in addition, along the tool.
+    gel_rotation: FloatArray  #: ``(3, 3)``, of the gel in its own frame.
+    height_offset: float  #: metres of indentation.
 
 
 class GapDraw:

@@ -217,17 +217,11 @@ def instrument_of(world: World, scene: SceneFile, draw: GapDraw) -> SoundingObje
 
 @dataclass(frozen=True, eq=False)
 class _Body:
-    """What is solved.
+    """What is solved."""
 
-    Attributes:
-        solid: its surface, m.
-        edge: m, of its elements.
-        fill: makes its volume mesh.
-    """
-
-    solid: Mesh
-    edge: float
-    fill: Callable[[], Tetrahedra]
+    solid: Mesh  #: its surface, m.
+    edge: float  #: m, of its elements.
+    fill: Callable[[], Tetrahedra]  #: makes its volume mesh.
 
 
 def _scaled_body(solid: Mesh, drawn: Mesh, scale: float, edge: float, store: Store) -> _Body:

@@ -17,20 +17,13 @@ class ShapeDeviation:
     Each coordinate's deviation is a stationary Gaussian field with a squared-exponential
     covariance, sampled as random plane waves (Rahimi and Recht, Random Features for
     Large-Scale Kernel Machines, 2007), so that it does not depend on any tessellation.
-
-    Attributes:
-        scale: true size over nominal size.
-        centre: ``(3,)`` metres, the point that scaling leaves in place.
-        wave_vectors: ``(3, waves, 3)`` rad per metre, a set for each coordinate.
-        phases: ``(3, waves)`` rad.
-        amplitude: metres, of each wave.
     """
 
-    scale: float
-    centre: FloatArray
-    wave_vectors: FloatArray
-    phases: FloatArray
-    amplitude: float
+    scale: float  #: true size over nominal size.
+    centre: FloatArray  #: ``(3,)`` metres, the point that scaling leaves in place.
+    wave_vectors: FloatArray  #: ``(3, waves, 3)`` rad per metre, a set for each coordinate.
+    phases: FloatArray  #: ``(3, waves)`` rad.
+    amplitude: float  #: metres, of each wave.
 
     @classmethod
     def draw(

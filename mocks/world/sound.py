@@ -43,23 +43,14 @@ BOUNCE_AFTER, BOUNCE = (2.0e-3, 4.0e-3), 0.4
 
 @dataclass(frozen=True, eq=False)
 class BlowDraw:
-    """One strike of the hammer.
+    """One strike of the hammer."""
 
-    Attributes:
-        hammer_from_true_hammer: ``(4, 4)``: where the tip really is, and which way it goes.
-        throw: s from the switching of the output to the blow.
-        pulse: s, the length of the half sine.
-        impulse: N s; zero where the striker does not reach the object.
-        bounce: s from the blow to a second one, None without.
-        bounce_share: of the impulse, that the second one has.
-    """
-
-    hammer_from_true_hammer: FloatArray
-    throw: float
-    pulse: float
-    impulse: float
-    bounce: float | None
-    bounce_share: float = BOUNCE
+    hammer_from_true_hammer: FloatArray  #: ``(4, 4)``: where the tip really is, and which way it goes.
+    throw: float  #: s from the switching of the output to the blow.
+    pulse: float  #: s, the length of the half sine.
+    impulse: float  #: N s; zero where the striker does not reach the object.
+    bounce: float | None  #: s from the blow to a second one, None without.
+    bounce_share: float = BOUNCE  #: of the impulse, that the second one has.
 
 
 class SoundDraw:
@@ -199,52 +190,33 @@ _PLACES = 400
 
 @dataclass(frozen=True, eq=False)
 class SoundingObject:
-    """The true object as something that sounds.
+    """The true object as something that sounds."""
 
-    Attributes:
-        modes: of the true object, by the places of the nominal one.
-        dampings: ``(m,)`` 1/s, of its material.
-        levels: ``(m,)`` Pa for each unit of a mode's ringing, as ``harness.sim.sound.modal_sound.ring``
-            makes it of a force in N and a gain in 1/sqrt(kg), at the microphone.
-        material: of which it is, by name; None where no gap draws its constants.
-    """
-
-    modes: Modes
-    dampings: FloatArray
+    modes: Modes  #: of the true object, by the places of the nominal one.
+    dampings: FloatArray  #: ``(m,)`` 1/s, of its material.
     levels: FloatArray
-    material: str | None = None
+    """``(m,)`` Pa for each unit of a mode's ringing, as ``harness.sim.sound.modal_sound.ring`` makes it of a
+    force in N and a gain in 1/sqrt(kg), at the microphone."""
+    material: str | None = None  #: of which it is, by name; None where no gap draws its constants.
 
 
 @dataclass(frozen=True, eq=False)
 class Aim:
-    """Where a strike goes.
+    """Where a strike goes."""
 
-    Attributes:
-        blow: as drawn.
-        met: where it meets the object; None where it does not.
-        direction_in_object: ``(3,)`` unit, the way of the blow.
-    """
-
-    blow: BlowDraw
-    met: Met | None
-    direction_in_object: FloatArray
+    blow: BlowDraw  #: as drawn.
+    met: Met | None  #: where it meets the object; None where it does not.
+    direction_in_object: FloatArray  #: ``(3,)`` unit, the way of the blow.
 
 
 @dataclass(frozen=True, eq=False)
 class StrikeTruth:
-    """One strike as it was, before any instrument has read it.
+    """One strike as it was, before any instrument has read it."""
 
-    Attributes:
-        rate: Hz.
-        force: ``(t,)`` N, from the switching of the striker's output on.
-        pressure: ``(t,)`` Pa at the microphone, at the same times, ambient noise included.
-        aim: where it went.
-    """
-
-    rate: float
-    force: FloatArray
-    pressure: FloatArray
-    aim: Aim
+    rate: float  #: Hz.
+    force: FloatArray  #: ``(t,)`` N, from the switching of the striker's output on.
+    pressure: FloatArray  #: ``(t,)`` Pa at the microphone, at the same times, ambient noise included.
+    aim: Aim  #: where it went.
 
 
 class WorldSound:
@@ -257,11 +229,6 @@ class WorldSound:
         seed: of the run.
         flange_from_hammer: ``(4, 4)``, as the station states it.
         rate: Hz, at which force and pressure are wanted.
-
-    Attributes:
-        frequencies: ``(m,)`` Hz, true.
-        dampings: ``(m,)`` 1/s, true.
-        noise: Pa, deviation of the ambient noise.
     """
 
     def __init__(
@@ -281,9 +248,11 @@ class WorldSound:
         self._room = self._room_of(gap)
         # Frequencies of a body go with one over its size.
         self.frequencies = self._draw.frequencies(instrument.modes.frequencies / world.scale)
-        self.dampings = self._draw.dampings(instrument.dampings)
+        """``(m,)`` Hz, true."""
+        self.dampings = self._draw.dampings(instrument.dampings)  #: ``(m,)`` 1/s, true.
         self._levels = instrument.levels * self._draw.gains(len(instrument.levels))
         self.noise = self._middling_level(gap) * 10.0 ** (-gap.sound.signal_to_noise / 20.0)
+        """Pa, deviation of the ambient noise."""
 
     @property
     def force_gain(self) -> float:

@@ -23,15 +23,10 @@ _FAR = 0.5e-3
 
 @dataclass(frozen=True)
 class PictureGrid:
-    """Where the pixels of one camera look.
+    """Where the pixels of one camera look."""
 
-    Attributes:
-        sensor: its pitch is that along the rows: from one column to the next.
-        aspect: pitch from one row to the next over that from one column to the next.
-    """
-
-    sensor: TactileSensor
-    aspect: float = 1.0
+    sensor: TactileSensor  #: its pitch is that along the rows: from one column to the next.
+    aspect: float = 1.0  #: pitch from one row to the next over that from one column to the next.
 
     @classmethod
     def drawn(cls, nominal: TactileSensor, pitch: float, aspect: float) -> "PictureGrid":
@@ -74,20 +69,17 @@ class WorldGel:
         gap: how this gel differs from its model.
         calibration: whose colours it has, a shipped name or a path.
         steeper: the pitch that colours are stated for over this gel's own: a slope in pixels.
-
-    Attributes:
-        background: ``(rows, columns, 3)``, the picture of the untouched gel.
-        calibration: whose colours this gel has.
     """
 
     def __init__(self, sensor: TactileSensor, gap: GelGap, calibration: str, steeper: float = 1.0) -> None:
         self._sensor = sensor
-        self.calibration = named_calibration(calibration)
+        self.calibration = named_calibration(calibration)  #: whose colours this gel has.
         require_own(self.calibration, sensor)
         self._steeper = steeper
         self._skirt = skirt_of(gap.skirt, sensor.pitch)
         self._optics = Optics(self.calibration, "exact", -rest_surface(sensor))
         self.background: ByteArray = self.calibration.background
+        """``(rows, columns, 3)``, the picture of the untouched gel."""
 
     def picture(self, penetration: FloatArray, gain: float, noise: FloatArray) -> ByteArray:
         """``(rows, columns, 3)`` uint8, RGB.

@@ -59,45 +59,30 @@ class Furniture:
 
 @dataclass(frozen=True, eq=False)
 class NominalBench:
-    """The bench as the scene and the station state it.
+    """The bench as the scene and the station state it."""
 
-    Attributes:
-        mesh: of the object, on a tessellation that nobody else uses.
-        base_from_object: ``(4, 4)``.
-        flange_from_gel: ``(4, 4)``.
-        sensor: the make of the gel.
-        calibration: of the gel that estimators believe in: the name of a shipped one, or a path.
-        other_calibration: the same of presses that no estimator has seen; None where there are none, and
-            the world has the estimator's.
-        camera: the scene camera, None where there is none.
-        furniture: around the object.
-        made_scale: of the object over its drawing, in ``mesh`` already; None where its size is stated.
-        drawing: of an object whose size is hidden, as the scene names it; None where ``mesh`` is that.
-    """
-
-    mesh: Mesh
-    base_from_object: FloatArray
-    flange_from_gel: FloatArray
-    sensor: TactileSensor
-    calibration: str
+    mesh: Mesh  #: of the object, on a tessellation that nobody else uses.
+    base_from_object: FloatArray  #: ``(4, 4)``.
+    flange_from_gel: FloatArray  #: ``(4, 4)``.
+    sensor: TactileSensor  #: the make of the gel.
+    calibration: str  #: of the gel that estimators believe in: the name of a shipped one, or a path.
     other_calibration: str | None
-    camera: Camera | None = None
-    furniture: Furniture = Furniture()
+    """the same of presses that no estimator has seen; None where there are none, and the world has the
+    estimator's."""
+    camera: Camera | None = None  #: the scene camera, None where there is none.
+    furniture: Furniture = Furniture()  #: around the object.
     made_scale: float | None = None
+    """of the object over its drawing, in ``mesh`` already; None where its size is stated."""
     drawing: Mesh | None = None
+    """of an object whose size is hidden, as the scene names it; None where ``mesh`` is that."""
 
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """Where something meets the true object.
+    """Where something meets the true object."""
 
-    Attributes:
-        point: ``(3,)`` m in the object's frame, on the true surface.
-        nominal: ``(3,)`` m, the same material point on the nominal surface.
-    """
-
-    point: FloatArray
-    nominal: FloatArray
+    point: FloatArray  #: ``(3,)`` m in the object's frame, on the true surface.
+    nominal: FloatArray  #: ``(3,)`` m, the same material point on the nominal surface.
 
 
 class World:
@@ -107,16 +92,6 @@ class World:
         bench: nominal.
         gap: distributions of what differs from it.
         seed: of the run.
-
-    Attributes:
-        sensor: the gel as it was made: the make's, but for its pitch.
-        drawing: the object as the scene names it.
-        nominal: the same of the size that it was made, on the world's own tessellation.
-        mesh: the true object, in its own frame; the same faces.
-        made_scale: of the drawing, over the one that the scene names: other than 1 where its size is hidden.
-        scale: of the true object, over that.
-        base_from_object: ``(4, 4)``, where it truly stands.
-        background: ``(rows, columns, 3)``, the picture of the untouched gel.
     """
 
     def __init__(self, bench: NominalBench, gap: Gap, seed: int) -> None:
@@ -124,18 +99,22 @@ class World:
             raise NotImplementedError("mocks.world.world: printed markers and shadows in the gel")
         self._bench = bench
         self.made_scale = 1.0 if bench.made_scale is None else bench.made_scale
+        """of the drawing, over the one that the scene names: other than 1 where its size is hidden."""
         self.drawing = bench.mesh if bench.drawing is None else bench.drawing
+        """the object as the scene names it."""
         self._draw = GapDraw(gap, seed)
         self._flange_from_gel: dict[int, FloatArray] = {}
         self._grid = PictureGrid.drawn(bench.sensor, self._draw.run.pitch, self._draw.run.aspect)
-        self.sensor = self._grid.sensor
+        self.sensor = self._grid.sensor  #: the gel as it was made: the make's, but for its pitch.
         edges = bench.mesh.corners - np.roll(bench.mesh.corners, 1, axis=1)
         longest = float(np.linalg.norm(edges, axis=-1).max())
         self.nominal = split_long_edges(bench.mesh, min(LONGEST_EDGE, CUT * longest))
+        """the same of the size that it was made, on the world's own tessellation."""
         self._deviation = self._draw.deviation(self.nominal.bounds.mean(axis=0))
-        self.scale = self._draw.run.scale
+        self.scale = self._draw.run.scale  #: of the true object, over that.
         self.mesh = Mesh(self._deviation.applied(self.nominal.vertices), self.nominal.faces)
-        self.base_from_object = read_only(self._placed())
+        """the true object, in its own frame; the same faces."""
+        self.base_from_object = read_only(self._placed())  #: ``(4, 4)``, where it truly stands.
         self._object_from_base = inverse(self.base_from_object)
         self._raster = RasterMesh(self.mesh)
         self._middle = apply(self.base_from_object, self.mesh.bounds.mean(axis=0)[None])[0]
@@ -147,7 +126,7 @@ class World:
         other = bench.other_calibration if gap.gel.calibration == "other presses" else None
         self._believed = other is None
         self._gel = WorldGel(self.sensor, gap.gel, other or bench.calibration, steeper)
-        self.background = self._gel.background
+        self.background = self._gel.background  #: ``(rows, columns, 3)``, the picture of the untouched gel.
         self._shading = self._draw.shading(self.sensor.rows, self.sensor.columns)
         self._contact = GelContact(self.mesh, self.sensor.window, SPRING_SPACING, REACH)
         self._housing = HousingContact(self.mesh, self.sensor) if gap.sensor.housing == "rigid" else None

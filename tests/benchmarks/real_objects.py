@@ -37,31 +37,18 @@ SEEDS = (1, 2, 3)
 
 @dataclass(frozen=True)
 class Row:
-    """One run.
+    """One run."""
 
-    Attributes:
-        object: its name here.
-        seed: of the run.
-        exit: code of the program.
-        error_mm: of the answer, None where there is none.
-        symmetric_mm: the same, modulo the object's symmetry.
-        in_region: whether the stated 90 % region holds the truth.
-        region_cm2: area of that region.
-        modes: places that stay likely.
-        seconds: of the program, planning to report; a resumed run counts from its resumption.
-        said: the program's error, or its warnings.
-    """
-
-    object: str
-    seed: int
-    exit: int
-    error_mm: float | None
-    symmetric_mm: float | None
-    in_region: bool | None
-    region_cm2: float | None
-    modes: int | None
-    seconds: float
-    said: str
+    object: str  #: its name here.
+    seed: int  #: of the run.
+    exit: int  #: code of the program.
+    error_mm: float | None  #: of the answer, None where there is none.
+    symmetric_mm: float | None  #: the same, modulo the object's symmetry.
+    in_region: bool | None  #: whether the stated 90 % region holds the truth.
+    region_cm2: float | None  #: area of that region.
+    modes: int | None  #: places that stay likely.
+    seconds: float  #: of the program, planning to report; a resumed run counts from its resumption.
+    said: str  #: the program's error, or its warnings.
 
 
 @dataclass(frozen=True)

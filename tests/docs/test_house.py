@@ -26,6 +26,12 @@ def test_a_room_holds_at_most_25_modules_and_says_what_it_is(room: Path) -> None
     assert (room / "__init__.py").read_text().startswith('"""')
 
 
+def test_fields_are_documented_where_they_stand() -> None:
+    sources = [path for top in (*PRODUCT, "tests") for path in (ROOT / top).rglob("*.py")]
+    heading = "Attributes" + ":"
+    assert [path for path in sources if heading in path.read_text().split()] == []
+
+
 def test_every_room_that_the_page_names_is_there() -> None:
     page = (ROOT / "ARCHITECTURE.md").read_text()
     named = re.findall(r"`((?:harness|drivers|mocks|tests|calibration)/[a-z_/]*)(?:\{([a-z_,]+)\})?/?`", page)

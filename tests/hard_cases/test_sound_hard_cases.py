@@ -43,21 +43,13 @@ HEARD: tuple[Senses, ...] = ("audio", "both")
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run of the mug with the default gap.
+    """One run of the mug with the default gap."""
 
-    Attributes:
-        good: its contacts.
-        harmed: the first four of them again, three of the strikes having failed.
-        model: of the mug.
-        prior: its yaw known.
-        true: ``(3,)`` metres, the last contact.
-    """
-
-    good: tuple[Observation, ...]
-    harmed: tuple[Observation, ...]
-    model: Model
-    prior: Prior
-    true: FloatArray
+    good: tuple[Observation, ...]  #: its contacts.
+    harmed: tuple[Observation, ...]  #: the first four of them again, three of the strikes having failed.
+    model: Model  #: of the mug.
+    prior: Prior  #: its yaw known.
+    true: FloatArray  #: ``(3,)`` metres, the last contact.
 
     def error(self, found: Estimate) -> float:
         """Metres."""

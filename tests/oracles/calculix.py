@@ -61,17 +61,11 @@ def write_input(
 
 
 class Run(NamedTuple):
-    """What one run gave and took.
+    """What one run gave and took."""
 
-    Attributes:
-        values: ``(rad/s)^2``, ascending.
-        seconds: of CPU time, on one thread.
-        peak: MB of memory at most.
-    """
-
-    values: FloatArray
-    seconds: float
-    peak: float
+    values: FloatArray  #: ``(rad/s)^2``, ascending.
+    seconds: float  #: of CPU time, on one thread.
+    peak: float  #: MB of memory at most.
 
 
 def run(program: str, folder: Path, job: str) -> Run:

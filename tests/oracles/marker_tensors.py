@@ -17,15 +17,10 @@ from harness.basics.errors import CalibrationRefused, OutOfDomain
 
 @dataclass(frozen=True, eq=False)
 class TensorMap:
-    """Displacement around a push, per displacement of the pushed spot.
+    """Displacement around a push, per displacement of the pushed spot."""
 
-    Attributes:
-        offsets: ``(nodes, 2)`` metres from the push, x and y along the surface.
-        tensors: ``(nodes, 3, 3)``; z points into the gel.
-    """
-
-    offsets: FloatArray
-    tensors: FloatArray
+    offsets: FloatArray  #: ``(nodes, 2)`` metres from the push, x and y along the surface.
+    tensors: FloatArray  #: ``(nodes, 3, 3)``; z points into the gel.
 
     def at(self, offsets: FloatArray) -> FloatArray:
         """``(..., 3, 3)`` at offsets ``(..., 2)`` metres, linear between nodes, zero beyond them."""

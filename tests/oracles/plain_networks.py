@@ -10,21 +10,13 @@ from harness.objectfile.vision.network import VisionGrid, VisionModel
 
 @dataclass(frozen=True, eq=False)
 class Query:
-    """What networks are asked of samples.
+    """What networks are asked of samples."""
 
-    Attributes:
-        networks: ``(n,)`` of each sample.
-        points: ``(n, 3)`` m, object frame.
-        views: ``(n, 3)`` unit, from the camera.
-        light: ``(3,)`` unit, towards the lamp.
-        extras: ``(n, 4)`` visibility and normal; ``(n, 0)`` for networks that are not told.
-    """
-
-    networks: IntArray
-    points: FloatArray
-    views: FloatArray
-    light: FloatArray
-    extras: FloatArray
+    networks: IntArray  #: ``(n,)`` of each sample.
+    points: FloatArray  #: ``(n, 3)`` m, object frame.
+    views: FloatArray  #: ``(n, 3)`` unit, from the camera.
+    light: FloatArray  #: ``(3,)`` unit, towards the lamp.
+    extras: FloatArray  #: ``(n, 4)`` visibility and normal; ``(n, 0)`` for networks that are not told.
 
 
 def encoded(values: FloatArray, octaves: int) -> FloatArray:

@@ -39,27 +39,16 @@ _NEAR = 4.0
 
 @dataclass(frozen=True, eq=False)
 class PublishedPress:
-    """One object; colours are RGB, heights in pixels towards the camera.
+    """One object; colours are RGB, heights in pixels towards the camera."""
 
-    Attributes:
-        surface: ``(rows, columns)`` published.
-        core: ``(rows, columns)`` where the object shaped the gel.
-        penetration: ``(rows, columns)`` metres into the untouched gel.
-        change: ``(rows, columns, 3)`` grey levels that the table gives the surface.
-        shaded: ``(rows, columns, 3)`` the same under shadows, by the published arithmetic.
-        plain: ``(rows, columns, 3)`` published without shadows.
-        live: ``(rows, columns, 3)`` published with them.
-        quantised: the tables of that JPEG.
-    """
-
-    surface: FloatArray
-    core: BoolArray
-    penetration: FloatArray
-    change: FloatArray
-    shaded: FloatArray
-    plain: FloatArray
-    live: FloatArray
-    quantised: dict[int, list[int]]
+    surface: FloatArray  #: ``(rows, columns)`` published.
+    core: BoolArray  #: ``(rows, columns)`` where the object shaped the gel.
+    penetration: FloatArray  #: ``(rows, columns)`` metres into the untouched gel.
+    change: FloatArray  #: ``(rows, columns, 3)`` grey levels that the table gives the surface.
+    shaded: FloatArray  #: ``(rows, columns, 3)`` the same under shadows, by the published arithmetic.
+    plain: FloatArray  #: ``(rows, columns, 3)`` published without shadows.
+    live: FloatArray  #: ``(rows, columns, 3)`` published with them.
+    quantised: dict[int, list[int]]  #: the tables of that JPEG.
 
     @property
     def background(self) -> FloatArray:

@@ -19,15 +19,10 @@ _COUNTS = np.dtype([("columns", "<u4"), ("rows", "<u4"), ("length", "<f4", (2,))
 
 @dataclass(frozen=True, eq=False)
 class TrueMap:
-    """A measured surface.
+    """A measured surface."""
 
-    Attributes:
-        heights: ``(rows, columns)`` metres.
-        pitch: ``(2,)`` metres a pixel, along x and along y.
-    """
-
-    heights: FloatArray
-    pitch: FloatArray
+    heights: FloatArray  #: ``(rows, columns)`` metres.
+    pitch: FloatArray  #: ``(2,)`` metres a pixel, along x and along y.
 
 
 def read_tmd(path: Path) -> TrueMap:

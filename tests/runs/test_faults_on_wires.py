@@ -41,17 +41,12 @@ BRAKING = 0.2
 
 @dataclass
 class Session:
-    """What became of a session in which something was cued as its first contact began.
+    """What became of a session in which something was cued as its first contact began."""
 
-    Attributes:
-        code: the program's exit code.
-        said: the JSON object it printed.
-        failed: after the failure and before the bench was closed: what the test looks at.
-    """
-
-    code: int
-    said: dict[str, Any]
+    code: int  #: the program's exit code.
+    said: dict[str, Any]  #: the JSON object it printed.
     failed: dict[str, Any] = field(default_factory=dict)
+    """after the failure and before the bench was closed: what the test looks at."""
 
 
 @dataclass(frozen=True)

@@ -41,17 +41,11 @@ estimates then, and draws its report, which takes longer."""
 
 @dataclass(frozen=True)
 class Whole:
-    """An uninterrupted run.
+    """An uninterrupted run."""
 
-    Attributes:
-        result: what it printed.
-        folder: of the run.
-        left: processes and ports after it.
-    """
-
-    result: dict[str, Any]
-    folder: Path
-    left: tuple[list[int], set[str]]
+    result: dict[str, Any]  #: what it printed.
+    folder: Path  #: of the run.
+    left: tuple[list[int], set[str]]  #: processes and ports after it.
 
 
 def started(folder: Path) -> RunProcess:

@@ -62,17 +62,11 @@ GREY_LEVELS = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One of the two runs.
+    """One of the two runs."""
 
-    Attributes:
-        run: its folder.
-        truth: what its world wrote.
-        found: its answer.
-    """
-
-    run: RunFiles
-    truth: dict[str, Any]
-    found: Answer
+    run: RunFiles  #: its folder.
+    truth: dict[str, Any]  #: what its world wrote.
+    found: Answer  #: its answer.
 
     @property
     def poses(self) -> FloatArray:

@@ -25,23 +25,14 @@ _TURNS = 3
 
 @dataclass(frozen=True, eq=False)
 class BallFit:
-    """A sphere of known radius laid under a recovered height map; metres and pixels.
+    """A sphere of known radius laid under a recovered height map; metres and pixels."""
 
-    Attributes:
-        centre: ``(2,)`` pixels (column, row), fitted.
-        top: metres, height of the sphere's top, fitted.
-        inside: ``(rows, columns)`` the pixels that were compared.
-        sphere: ``(rows, columns)`` metres, the sphere, its lower half left out as flat.
-        rmse: metres, recovered less sphere.
-        flat: metres, the same of the plane that fits the sphere best.
-    """
-
-    centre: FloatArray
-    top: float
-    inside: BoolArray
-    sphere: FloatArray
-    rmse: float
-    flat: float
+    centre: FloatArray  #: ``(2,)`` pixels (column, row), fitted.
+    top: float  #: metres, height of the sphere's top, fitted.
+    inside: BoolArray  #: ``(rows, columns)`` the pixels that were compared.
+    sphere: FloatArray  #: ``(rows, columns)`` metres, the sphere, its lower half left out as flat.
+    rmse: float  #: metres, recovered less sphere.
+    flat: float  #: metres, the same of the plane that fits the sphere best.
 
     def fitted(self, ball: float) -> FloatArray:
         """``(n, 3)`` by how much offset and centre change the sphere inside; ``ball`` in pixels."""
@@ -90,17 +81,11 @@ def fit_ball(height: FloatArray, near: FloatArray, contact: float, pitch: float,
 
 @dataclass(frozen=True, eq=False)
 class Taught:
-    """A calibration and what held-out presses need of its presses.
+    """A calibration and what held-out presses need of its presses."""
 
-    Attributes:
-        calibration: the artefact.
-        bias: ``(2,)`` pixels from where the detector finds a centre to where the fit does.
-        contact: pixels, radius of the contact line.
-    """
-
-    calibration: TactileCalibration
-    bias: FloatArray
-    contact: float
+    calibration: TactileCalibration  #: the artefact.
+    bias: FloatArray  #: ``(2,)`` pixels from where the detector finds a centre to where the fit does.
+    contact: float  #: pixels, radius of the contact line.
 
 
 def usable(pictures: Pictures, ball: float) -> PressPack:

@@ -13,33 +13,19 @@ _FINE = 8
 
 @dataclass(frozen=True)
 class DrawnDots:
-    """A marked gel at rest.
+    """A marked gel at rest."""
 
-    Attributes:
-        wide: dots in a row.
-        high: rows of dots.
-        spacing: pixels.
-        radius: pixels.
-        turned: rad, of the grid in the picture.
-        aspect: a pixel's height over its width.
-        ink: share of the light that a dot gives back.
-        blur: pixels, sigma of the lens.
-        noise: grey levels.
-        barrel: pixels by which a lens draws the corner of the picture outwards.
-        middle: ``(2,)`` pixels (column, row), of the grid.
-    """
-
-    wide: int = 10
-    high: int = 7
-    spacing: float = 29.0
-    radius: float = 6.0
-    turned: float = 0.02
-    aspect: float = 1.0
-    ink: float = 0.2
-    blur: float = 0.7
-    noise: float = 1.5
-    barrel: float = 0.0
-    middle: tuple[float, float] = (160.3, 118.8)
+    wide: int = 10  #: dots in a row.
+    high: int = 7  #: rows of dots.
+    spacing: float = 29.0  #: pixels.
+    radius: float = 6.0  #: pixels.
+    turned: float = 0.02  #: rad, of the grid in the picture.
+    aspect: float = 1.0  #: a pixel's height over its width.
+    ink: float = 0.2  #: share of the light that a dot gives back.
+    blur: float = 0.7  #: pixels, sigma of the lens.
+    noise: float = 1.5  #: grey levels.
+    barrel: float = 0.0  #: pixels by which a lens draws the corner of the picture outwards.
+    middle: tuple[float, float] = (160.3, 118.8)  #: ``(2,)`` pixels (column, row), of the grid.
 
     def places(self) -> FloatArray:
         """``(dots, 2)`` pixels (column, row), row by row."""

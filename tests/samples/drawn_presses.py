@@ -20,17 +20,11 @@ _SKIRT = 3.0
 
 @dataclass(frozen=True)
 class DrawnGel:
-    """A sensor.
+    """A sensor."""
 
-    Attributes:
-        dimming: grey levels that a contact takes from every channel.
-        noise: grey levels.
-        aspect: a pixel's height over its width; lengths are in square pixels of the same area.
-    """
-
-    dimming: float = 0.0
-    noise: float = 1.0
-    aspect: float = 1.0
+    dimming: float = 0.0  #: grey levels that a contact takes from every channel.
+    noise: float = 1.0  #: grey levels.
+    aspect: float = 1.0  #: a pixel's height over its width; lengths are in square pixels of the same area.
 
     def rest(self) -> FloatArray:
         """``(rows, columns, 3)`` the untouched gel: a slope of brightness, and three different levels."""

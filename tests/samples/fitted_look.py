@@ -30,17 +30,11 @@ _OPAQUE = 40.0
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A surface as distances and colours.
+    """A surface as distances and colours."""
 
-    Attributes:
-        points: ``(n, 3)`` m on the surface, dense.
-        normals: ``(n, 3)`` unit.
-        tree: of the points.
-    """
-
-    points: FloatArray
-    normals: FloatArray
-    tree: cKDTree
+    points: FloatArray  #: ``(n, 3)`` m on the surface, dense.
+    normals: FloatArray  #: ``(n, 3)`` unit.
+    tree: cKDTree  #: of the points.
 
     @classmethod
     def of(cls, mesh: Mesh, count: int, random: np.random.Generator) -> "Field":

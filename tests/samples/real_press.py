@@ -45,27 +45,17 @@ def set_of(data: Path, word: str) -> Pictures:
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """A press, and what the other folds' presses teach.
+    """A press, and what the other folds' presses teach."""
 
-    Attributes:
-        name: of its picture.
-        live: ``(rows, columns, 3)``.
-        model: of the other folds.
-        calibration: of that model, light and skirt included; its background is theirs too.
-        start: ``(2,)`` pixels (column, row), from the detector and two numbers refined.
-        ball: pixels, radius.
-        drift: ``(3,)`` grey levels by which the light of this picture differs, from where it is untouched.
-        shadow: as the other folds' presses show it; None where they show none.
-    """
-
-    name: str
-    live: ByteArray
-    model: FittedModel
-    calibration: LitCalibration
-    start: FloatArray
-    ball: float
+    name: str  #: of its picture.
+    live: ByteArray  #: ``(rows, columns, 3)``.
+    model: FittedModel  #: of the other folds.
+    calibration: LitCalibration  #: of that model, light and skirt included; its background is theirs too.
+    start: FloatArray  #: ``(2,)`` pixels (column, row), from the detector and two numbers refined.
+    ball: float  #: pixels, radius.
     drift: FloatArray
-    shadow: ShadowTable | None
+    """``(3,)`` grey levels by which the light of this picture differs, from where it is untouched."""
+    shadow: ShadowTable | None  #: as the other folds' presses show it; None where they show none.
 
     def region(self, radii: float) -> BoolArray:
         """``(rows, columns)`` the pixels within so many contact radii."""
@@ -76,23 +66,14 @@ class HeldOut:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A drawing at the pose that explains the press best.
+    """A drawing at the pose that explains the press best."""
 
-    Attributes:
-        image: ``(rows, columns, 3)`` rounded.
-        pose: column and row of the centre in pixels, depth in pixels.
-        contact: dB within 0.95 of the contact's radius.
-        around: dB within ``REGION``.
-        frame: dB over the picture.
-        alike: structural similarity over the picture.
-    """
-
-    image: ByteArray
-    pose: FloatArray
-    contact: float
-    around: float
-    frame: float
-    alike: float
+    image: ByteArray  #: ``(rows, columns, 3)`` rounded.
+    pose: FloatArray  #: column and row of the centre in pixels, depth in pixels.
+    contact: float  #: dB within 0.95 of the contact's radius.
+    around: float  #: dB within ``REGION``.
+    frame: float  #: dB over the picture.
+    alike: float  #: structural similarity over the picture.
 
 
 def held_out_presses(pictures: Pictures, who: Identity, folds: int = FOLDS) -> Iterator[HeldOut]:

@@ -42,19 +42,12 @@ def stepped_block() -> Mesh:
 
 @dataclass(frozen=True)
 class Press:
-    """One place to press: a point of the surface and the way the gel comes.
+    """One place to press: a point of the surface and the way the gel comes."""
 
-    Attributes:
-        point: ``(3,)`` metres, in the object's frame.
-        axis: ``(3,)`` unit, into the object.
-        yaw: rad, of the sensor about the axis.
-        depth: metres.
-    """
-
-    point: tuple[float, float, float]
-    axis: tuple[float, float, float]
-    yaw: float = 0.0
-    depth: float = 0.8e-3
+    point: tuple[float, float, float]  #: ``(3,)`` metres, in the object's frame.
+    axis: tuple[float, float, float]  #: ``(3,)`` unit, into the object.
+    yaw: float = 0.0  #: rad, of the sensor about the axis.
+    depth: float = 0.8e-3  #: metres.
 
     @property
     def object_from_gel(self) -> FloatArray:

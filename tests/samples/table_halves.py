@@ -15,15 +15,10 @@ from harness.basics.arrays import BoolArray, FloatArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class Taught:
-    """A table with its errors.
+    """A table with its errors."""
 
-    Attributes:
-        model: of some presses.
-        error: of its table.
-    """
-
-    model: FittedModel
-    error: FloatArray
+    model: FittedModel  #: of some presses.
+    error: FloatArray  #: of its table.
 
 
 def taught(pack: PressPack, which: IntArray, ball: float) -> Taught:

@@ -16,15 +16,12 @@ class Relay:
 
     Args:
         target: the address that they lead to.
-
-    Attributes:
-        address: of the relay.
-        sent: bytes that were sent to each port of the target.
     """
 
     def __init__(self, target: str) -> None:
-        self.address = "127." + ".".join(str(1 + secrets.randbelow(254)) for _ in range(3))
+        self.address = "127." + ".".join(str(1 + secrets.randbelow(254)) for _ in range(3))  #: of the relay.
         self.sent: defaultdict[int, bytes] = defaultdict(bytes)
+        """bytes that were sent to each port of the target."""
         self._target = target
         self._closing = False
         self._listeners = {port: socket.create_server((self.address, port)) for port in PORTS}

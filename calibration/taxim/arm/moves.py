@@ -38,50 +38,31 @@ _STEP = 1e-6
 
 @dataclass(frozen=True)
 class Uncertain:
-    """A number with its uncertainty.
+    """A number with its uncertainty."""
 
-    Attributes:
-        value: in the unit of its name.
-        sigma: one standard uncertainty: the presses' scatter, and how far ways to see their place differ.
-        of_scatter: the part of it that more presses make smaller.
-        within95: half the width of the interval that holds the truth 19 times of 20.
-    """
-
-    value: float
+    value: float  #: in the unit of its name.
     sigma: float
-    of_scatter: float
-    within95: float
+    """one standard uncertainty: the presses' scatter, and how far ways to see their place differ."""
+    of_scatter: float  #: the part of it that more presses make smaller.
+    within95: float  #: half the width of the interval that holds the truth 19 times of 20.
 
 
 @dataclass(frozen=True, eq=False)
 class ArmScale:
-    """How the picture lies on the gel, by the arm.
+    """How the picture lies on the gel, by the arm."""
 
-    Attributes:
-        wide: m from column to column.
-        high: m from row to row.
-        pitch: m a pixel, of a square one of the same area.
-        aspect: a pixel's height over its width.
-        rotation: rad, of the picture against the tool's frame of the gel, about the gel's z axis.
-        skew: rad, that rows and columns are from square; not zero by more than its error: look for a reason.
-        gel_from_pixels: ``(2, 2)`` m, ``G``.
-        scatter: m, standard deviation of a press about the map, along one axis.
-        used: places in the arguments of the presses that it stands on.
-        off: of those that lie off it.
-        residuals: ``(presses, 2)`` m, of all of them.
-    """
-
-    wide: Uncertain
-    high: Uncertain
-    pitch: Uncertain
-    aspect: Uncertain
-    rotation: Uncertain
+    wide: Uncertain  #: m from column to column.
+    high: Uncertain  #: m from row to row.
+    pitch: Uncertain  #: m a pixel, of a square one of the same area.
+    aspect: Uncertain  #: a pixel's height over its width.
+    rotation: Uncertain  #: rad, of the picture against the tool's frame of the gel, about the gel's z axis.
     skew: Uncertain
-    gel_from_pixels: FloatArray
-    scatter: float
-    used: tuple[int, ...]
-    off: tuple[int, ...]
-    residuals: FloatArray
+    """rad, that rows and columns are from square; not zero by more than its error: look for a reason."""
+    gel_from_pixels: FloatArray  #: ``(2, 2)`` m, ``G``.
+    scatter: float  #: m, standard deviation of a press about the map, along one axis.
+    used: tuple[int, ...]  #: places in the arguments of the presses that it stands on.
+    off: tuple[int, ...]  #: of those that lie off it.
+    residuals: FloatArray  #: ``(presses, 2)`` m, of all of them.
 
     @property
     def aspect_taken(self) -> float:

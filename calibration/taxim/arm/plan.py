@@ -37,52 +37,31 @@ _SPARE = 0.1e-3
 
 @dataclass(frozen=True)
 class PressSettings:
-    """How the ball is pressed (SI).
+    """How the ball is pressed (SI)."""
 
-    Attributes:
-        presses: how many.
-        depth: m of the ball in the gel, from where the pictures first show it.
-        step: m between looks on the way down.
-        pictures: of the way down that are kept, from the first touch on.
-        every: presses between two pictures of the untouched gel that count as background.
-        notice: grey levels of change at one place that are a touch.
-        ahead: m above the expected touch at which looking begins, once it is known where the ball is.
-        far: m above the stated place of the ball at which looking begins before that.
-        still: when a picture counts.
-    """
-
-    presses: int = 49
-    depth: float = 0.8e-3
-    step: float = 0.1e-3
-    pictures: int = PICTURES
-    every: int = 12
-    notice: float = 8.0
+    presses: int = 49  #: how many.
+    depth: float = 0.8e-3  #: m of the ball in the gel, from where the pictures first show it.
+    step: float = 0.1e-3  #: m between looks on the way down.
+    pictures: int = PICTURES  #: of the way down that are kept, from the first touch on.
+    every: int = 12  #: presses between two pictures of the untouched gel that count as background.
+    notice: float = 8.0  #: grey levels of change at one place that are a touch.
     ahead: float = 0.4e-3
-    far: float = 2.5e-3
-    still: Stillness = field(default_factory=Stillness)
+    """m above the expected touch at which looking begins, once it is known where the ball is."""
+    far: float = 2.5e-3  #: m above the stated place of the ball at which looking begins before that.
+    still: Stillness = field(default_factory=Stillness)  #: when a picture counts.
 
 
 @dataclass(frozen=True, eq=False)
 class PressMotion:
-    """One place, ready to be pressed.
+    """One place, ready to be pressed."""
 
-    Attributes:
-        start: ``(6,)`` rad, where the travel was planned to start.
-        travel: ``(n, 6)`` rad from there to the stand-off.
-        base_from_stand_off: ``(4, 4)`` of the flange.
-        axis: ``(3,)`` unit in base: the way the gel is pressed.
-        touch: m from the stand-off to where the gel meets the ball as the scene states it.
-        lowest: m from the stand-off that were rehearsed; the arm goes no further.
-        on_gel: ``(2,)`` m, where on the gel the ball is to be.
-    """
-
-    start: FloatArray
-    travel: FloatArray
-    base_from_stand_off: FloatArray
-    axis: FloatArray
-    touch: float
-    lowest: float
-    on_gel: FloatArray
+    start: FloatArray  #: ``(6,)`` rad, where the travel was planned to start.
+    travel: FloatArray  #: ``(n, 6)`` rad from there to the stand-off.
+    base_from_stand_off: FloatArray  #: ``(4, 4)`` of the flange.
+    axis: FloatArray  #: ``(3,)`` unit in base: the way the gel is pressed.
+    touch: float  #: m from the stand-off to where the gel meets the ball as the scene states it.
+    lowest: float  #: m from the stand-off that were rehearsed; the arm goes no further.
+    on_gel: FloatArray  #: ``(2,)`` m, where on the gel the ball is to be.
 
     def to_parameters(self) -> dict[str, Any]:
         """As JSON values, with the unit in each key."""
@@ -107,19 +86,12 @@ class PressMotion:
 
 @dataclass(frozen=True, eq=False)
 class PressPlan:
-    """Every motion of a calibration.
+    """Every motion of a calibration."""
 
-    Attributes:
-        motions: of the presses.
-        rehearsal: what the twin found.
-        settings: how the ball is pressed.
-        ball_in_base: ``(3,)`` m, the ball's top as the scene states it.
-    """
-
-    motions: tuple[PressMotion, ...]
-    rehearsal: RehearsalReport
-    settings: PressSettings
-    ball_in_base: FloatArray
+    motions: tuple[PressMotion, ...]  #: of the presses.
+    rehearsal: RehearsalReport  #: what the twin found.
+    settings: PressSettings  #: how the ball is pressed.
+    ball_in_base: FloatArray  #: ``(3,)`` m, the ball's top as the scene states it.
 
     def to_json(self) -> dict[str, Any]:
         """For ``run.json``: settings, and every step with its kind."""

@@ -219,14 +219,12 @@ class PressWatch:
 
     Args:
         ball: radius in pixels, by the stated pitch.
-
-    Attributes:
-        first: ``(rows, columns, 3)`` grey levels, the first picture of the untouched gel; None before it.
     """
 
     def __init__(self, ball: float) -> None:
         self._ball = ball
         self.first: FloatArray | None = None
+        """``(rows, columns, 3)`` grey levels, the first picture of the untouched gel; None before it."""
         self._offsets: list[float] = []
         self._verdicts: list[Refused | None] = []
 

@@ -68,56 +68,33 @@ ARM = "arm.base_from_flange"
 
 @dataclass(frozen=True, eq=False)
 class Taken:
-    """One press as it was recorded.
+    """One press as it was recorded."""
 
-    Attributes:
-        name: for people and for files.
-        image: ``(rows, columns, 3)`` grey levels, pressed.
-        rest: ``(rows, columns, 3)`` grey levels, untouched, just before.
-        descent: ``(pictures, rows, columns, 3)`` grey levels against ``rest``, from the first touch on.
-        on_gel: ``(2,)`` m, where the arm says the ball is on the gel.
-        touched: whether the ball was met.
-        settled: whether the picture came to rest.
-        unrest: grey levels between the last two looks.
-        seconds: that it was waited for.
-    """
-
-    name: str
-    image: FloatArray
-    rest: FloatArray
+    name: str  #: for people and for files.
+    image: FloatArray  #: ``(rows, columns, 3)`` grey levels, pressed.
+    rest: FloatArray  #: ``(rows, columns, 3)`` grey levels, untouched, just before.
     descent: FloatArray
-    on_gel: FloatArray
-    touched: bool
-    settled: bool
-    unrest: float
-    seconds: float
+    """``(pictures, rows, columns, 3)`` grey levels against ``rest``, from the first touch on."""
+    on_gel: FloatArray  #: ``(2,)`` m, where the arm says the ball is on the gel.
+    touched: bool  #: whether the ball was met.
+    settled: bool  #: whether the picture came to rest.
+    unrest: float  #: grey levels between the last two looks.
+    seconds: float  #: that it was waited for.
 
 
 @dataclass(frozen=True, eq=False)
 class ArmPresses:
-    """A run's presses.
+    """A run's presses."""
 
-    Attributes:
-        pictures: that a calibration is made of; presses without contact or rest are refused in it.
-        taken: every press, in the order they were made.
-        backgrounds: ``(n, rows, columns, 3)`` grey levels, of the untouched gel, in order.
-        ball_radius: m.
-        pitch: m a pixel, as the station states it.
-        sensor: its make.
-        serial: of the sensor.
-        drift: grey levels, the most that the untouched gel as a whole moved from the first background.
-        marked: grey levels, the most that a place of it changed beside the whole.
-    """
-
-    pictures: Pictures
-    taken: tuple[Taken, ...]
-    backgrounds: FloatArray
-    ball_radius: float
-    pitch: float
-    sensor: str
-    serial: str
-    drift: float
-    marked: float
+    pictures: Pictures  #: that a calibration is made of; presses without contact or rest are refused in it.
+    taken: tuple[Taken, ...]  #: every press, in the order they were made.
+    backgrounds: FloatArray  #: ``(n, rows, columns, 3)`` grey levels, of the untouched gel, in order.
+    ball_radius: float  #: m.
+    pitch: float  #: m a pixel, as the station states it.
+    sensor: str  #: its make.
+    serial: str  #: of the sensor.
+    drift: float  #: grey levels, the most that the untouched gel as a whole moved from the first background.
+    marked: float  #: grey levels, the most that a place of it changed beside the whole.
 
     def scale(self) -> ArmScale:
         """Pitch, aspect and rotation by the arm.

@@ -18,40 +18,24 @@ _SHARE = 99.5
 
 @dataclass(frozen=True)
 class Stillness:
-    """When a picture counts.
+    """When a picture counts."""
 
-    Attributes:
-        limit: grey levels by which two looks may differ.
-        looks: looks in a row, each still against the one before, that make it settled.
-        interval: s between looks.
-        patience: s after which it is given up.
-        frames: a look is the mean of so many.
-        timeout: s that the camera may take for a look.
-    """
-
-    limit: float = 1.0
-    looks: int = 2
-    interval: float = 0.2
-    patience: float = 5.0
-    frames: int = 3
-    timeout: float = 3.0
+    limit: float = 1.0  #: grey levels by which two looks may differ.
+    looks: int = 2  #: looks in a row, each still against the one before, that make it settled.
+    interval: float = 0.2  #: s between looks.
+    patience: float = 5.0  #: s after which it is given up.
+    frames: int = 3  #: a look is the mean of so many.
+    timeout: float = 3.0  #: s that the camera may take for a look.
 
 
 @dataclass(frozen=True, eq=False)
 class Settling:
-    """How a picture came to rest.
+    """How a picture came to rest."""
 
-    Attributes:
-        frames: the last look.
-        unrest: ``(n,)`` grey levels between each look and the one before.
-        settled: whether it came to rest within the patience.
-        seconds: from the first look to the last.
-    """
-
-    frames: Reading
-    unrest: FloatArray
-    settled: bool
-    seconds: float
+    frames: Reading  #: the last look.
+    unrest: FloatArray  #: ``(n,)`` grey levels between each look and the one before.
+    settled: bool  #: whether it came to rest within the patience.
+    seconds: float  #: from the first look to the last.
 
 
 def settle(gel: TactileCamera, pause: Callable[[float], None], still: Stillness) -> Settling:

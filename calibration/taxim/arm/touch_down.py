@@ -37,19 +37,12 @@ _FAINT = 3.0
 
 @dataclass(frozen=True)
 class Descent:
-    """One way to see the middle of a contact.
+    """One way to see the middle of a contact."""
 
-    Attributes:
-        above: share of the strongest change from which on a pixel counts.
-        even: whether pixels that count, count alike; else by how far they are above.
-        pictures: of the way down, from the first touch on.
-        degree: of the polynomial by which the middle is carried back.
-    """
-
-    above: float
-    even: bool
-    pictures: int
-    degree: int = 1
+    above: float  #: share of the strongest change from which on a pixel counts.
+    even: bool  #: whether pixels that count, count alike; else by how far they are above.
+    pictures: int  #: of the way down, from the first touch on.
+    degree: int = 1  #: of the polynomial by which the middle is carried back.
 
 
 WAYS = (

@@ -57,25 +57,15 @@ from mocks.in_process.bench import in_process_bench
 
 @dataclass(frozen=True)
 class Cell:
-    """Which run.
+    """Which run."""
 
-    Attributes:
-        object: its name in the table.
-        spacing: ``"close"`` or ``"spread"``.
-        gap: ``"default"`` or ``"none"``.
-        yaw: ``"known"`` to the estimator or ``"unknown"``.
-        seed: of the sites, the world and the draws.
-        sound: whether every place is struck too.
-        choose: ``"planned"`` contacts, or ``"active"`` ones, chosen one by one.
-    """
-
-    object: str
-    spacing: str
-    gap: str
-    yaw: str
-    seed: int
-    sound: bool = False
-    choose: str = "planned"
+    object: str  #: its name in the table.
+    spacing: str  #: ``"close"`` or ``"spread"``.
+    gap: str  #: ``"default"`` or ``"none"``.
+    yaw: str  #: ``"known"`` to the estimator or ``"unknown"``.
+    seed: int  #: of the sites, the world and the draws.
+    sound: bool = False  #: whether every place is struck too.
+    choose: str = "planned"  #: ``"planned"`` contacts, or ``"active"`` ones, chosen one by one.
 
     @property
     def conditions(self) -> dict[str, str]:

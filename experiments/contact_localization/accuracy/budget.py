@@ -49,23 +49,14 @@ _NO_OBJECTFILE = (
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What an answer is made from.
+    """What an answer is made from."""
 
-    Attributes:
-        observations: of the contacts.
-        models: of the object.
-        prior: of its orientation.
-        seed: of the draws.
-        object: the name that its seconds were measured under.
-        true: ``(3,)`` metres, the last contact; None where it is not known.
-    """
-
-    observations: tuple[Observation, ...]
-    models: Models
-    prior: Prior
-    seed: int
-    object: str
-    true: FloatArray | None = None
+    observations: tuple[Observation, ...]  #: of the contacts.
+    models: Models  #: of the object.
+    prior: Prior  #: of its orientation.
+    seed: int  #: of the draws.
+    object: str  #: the name that its seconds were measured under.
+    true: FloatArray | None = None  #: ``(3,)`` metres, the last contact; None where it is not known.
 
     def unfit(self, setting: Setting) -> str | None:
         """A setting that needs sound does not fit where no contact was struck."""

@@ -64,25 +64,16 @@ _CHUNK = 512
 
 @dataclass(frozen=True)
 class Mfcc:
-    """How the features are made.
-
-    Attributes:
-        duration: s from the strike on; the paper's are 3 s, a strike at the bench has rung out before.
-        frame: s of one Hann window; frames do not overlap.
-        bands: triangles, evenly spaced in mel.
-        lowest: Hz.
-        highest: Hz, or half the rate if that is lower.
-        coefficients: of the cosine transform that are kept, the first being the mean level.
-        range: dB below the loudest band of the sound at which a band's level is cut off.
-    """
+    """How the features are made."""
 
     duration: float = 0.5
-    frame: float = 0.046
-    bands: int = 64
-    lowest: float = 50.0
-    highest: float = 20_000.0
-    coefficients: int = 20
-    range: float = 80.0
+    """s from the strike on; the paper's are 3 s, a strike at the bench has rung out before."""
+    frame: float = 0.046  #: s of one Hann window; frames do not overlap.
+    bands: int = 64  #: triangles, evenly spaced in mel.
+    lowest: float = 50.0  #: Hz.
+    highest: float = 20_000.0  #: Hz, or half the rate if that is lower.
+    coefficients: int = 20  #: of the cosine transform that are kept, the first being the mean level.
+    range: float = 80.0  #: dB below the loudest band of the sound at which a band's level is cut off.
 
 
 def mfcc(sound: FloatArray, rate: float, settings: Mfcc) -> FloatArray:

@@ -38,37 +38,24 @@ _FAR_BELOW = -1000.0
 
 @dataclass(frozen=True)
 class Gate:
-    """How one contact fits the answer.
+    """How one contact fits the answer."""
 
-    Attributes:
-        fit: nats at the best hypothesis, 0 at best; None where the image shows no contact.
-        missed: the image shows no contact; the contact was not used.
-        slipped: it fits much worse than the others: the object moved, or the gel slid.
-        repeats: index of an earlier contact at the same place and attitude, or None; such
-            presses together count once.
-    """
-
-    fit: float | None
-    missed: bool
-    slipped: bool
+    fit: float | None  #: nats at the best hypothesis, 0 at best; None where the image shows no contact.
+    missed: bool  #: the image shows no contact; the contact was not used.
+    slipped: bool  #: it fits much worse than the others: the object moved, or the gel slid.
     repeats: int | None
+    """index of an earlier contact at the same place and attitude, or None; such presses together count
+    once."""
 
 
 @dataclass(frozen=True)
 class Likeness:
-    """How contacts taken together fit one hypothesis.
+    """How contacts taken together fit one hypothesis."""
 
-    Attributes:
-        typical: nats, the median of their fits.
-        quartile: nats, their lower quartile, or what all but the worst of a few exceed.
-        limit: nats, the least ``typical`` that is not refused.
-        many: whether they are enough to be judged by their quartile too.
-    """
-
-    typical: float
-    quartile: float
-    limit: float
-    many: bool
+    typical: float  #: nats, the median of their fits.
+    quartile: float  #: nats, their lower quartile, or what all but the worst of a few exceed.
+    limit: float  #: nats, the least ``typical`` that is not refused.
+    many: bool  #: whether they are enough to be judged by their quartile too.
 
     @property
     def margin(self) -> float:

@@ -100,44 +100,28 @@ MOST = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """The answer to one run.
+    """The answer to one run."""
 
-    Attributes:
-        position_in_object: ``(3,)`` metres: the last contact, a point on the surface.
-        contacts: ``(contacts, 3)`` metres: all of them, on the surface to half a pixel of a view.
-        modes: places the last contact may be, heaviest first.
-        region: the part of the surface that holds 90 % of the posterior.
-        credible90: metres around the answer that hold 90 % of it.
-        candidates: ``(10, 3)`` metres: the most probable distinct hypotheses of the last contact.
-        gates: how each contact's image fits; none where no image was used.
-        yaw: rad away from the nominal orientation, of the hypothesis that ``contacts`` are of.
-        yaw_sigma: rad, circular spread of the posterior.
-        points: ``(n, 3)`` metres: hypotheses of the last contact, for pictures.
-        weights: ``(n,)`` of the hypotheses, summing to 1.
-        seconds: by stage.
-        hypotheses: where the gel was at the first contact; turns that the object does not show are not among
-            them.
-        doubts: what a reader must know of an answer whose sound may be another object's, or whose bench is
-            further off than stated.
-        strain: how many times further off the readings are than the bench's stated errors allow
-            (``strain``); 0 where no image says.
-    """
-
-    position_in_object: FloatArray
-    contacts: FloatArray
-    modes: tuple[Mode, ...]
-    region: Region
-    credible90: float
-    candidates: FloatArray
-    gates: tuple[Gate, ...]
-    yaw: float
-    yaw_sigma: float
-    points: FloatArray
-    weights: FloatArray
-    seconds: dict[str, float]
+    position_in_object: FloatArray  #: ``(3,)`` metres: the last contact, a point on the surface.
+    contacts: FloatArray  #: ``(contacts, 3)`` metres: all of them, on the surface to half a pixel of a view.
+    modes: tuple[Mode, ...]  #: places the last contact may be, heaviest first.
+    region: Region  #: the part of the surface that holds 90 % of the posterior.
+    credible90: float  #: metres around the answer that hold 90 % of it.
+    candidates: FloatArray  #: ``(10, 3)`` metres: the most probable distinct hypotheses of the last contact.
+    gates: tuple[Gate, ...]  #: how each contact's image fits; none where no image was used.
+    yaw: float  #: rad away from the nominal orientation, of the hypothesis that ``contacts`` are of.
+    yaw_sigma: float  #: rad, circular spread of the posterior.
+    points: FloatArray  #: ``(n, 3)`` metres: hypotheses of the last contact, for pictures.
+    weights: FloatArray  #: ``(n,)`` of the hypotheses, summing to 1.
+    seconds: dict[str, float]  #: by stage.
     hypotheses: Hypotheses
+    """where the gel was at the first contact; turns that the object does not show are not among them."""
     doubts: tuple[str, ...] = ()
+    """what a reader must know of an answer whose sound may be another object's, or whose bench is further off
+    than stated."""
     strain: float = 0.0
+    """how many times further off the readings are than the bench's stated errors allow (``strain``); 0 where
+    no image says."""
 
     @property
     def times_stated(self) -> float:
@@ -147,20 +131,14 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class PosteriorSolution:
-    """Hypotheses with how the best of them fits.
+    """Hypotheses with how the best of them fits."""
 
-    Attributes:
-        hypotheses: the posterior.
-        members: ``(m,)`` indices of the contacts whose image counts.
-        fits: ``(m,)`` nats of each at the best hypothesis.
-        pictured: whether pictures along the tool say where a hypothesis' contact lies; without, it
-            is the sample nearest to where the tool ended.
-    """
-
-    hypotheses: Hypotheses
-    members: IntArray
-    fits: FloatArray
+    hypotheses: Hypotheses  #: the posterior.
+    members: IntArray  #: ``(m,)`` indices of the contacts whose image counts.
+    fits: FloatArray  #: ``(m,)`` nats of each at the best hypothesis.
     pictured: bool = True
+    """whether pictures along the tool say where a hypothesis' contact lies; without, it is the sample nearest
+    to where the tool ended."""
 
 
 def locate(

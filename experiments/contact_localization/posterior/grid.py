@@ -224,19 +224,12 @@ class _Axes:
 
 @dataclass(frozen=True, eq=False)
 class _Shape:
-    """Of the hypotheses of a round, in the neighbourhood of one.
+    """Of the hypotheses of a round, in the neighbourhood of one."""
 
-    Attributes:
-        carried: ``(d, 6)`` units of place for each sigma of a shared error.
-        left: ``(d, d)`` lower triangular: a factor of the covariance of what is left of a place.
-        shared: ``(6, 6)`` lower triangular: of the shared errors'.
-        mean: ``(6,)`` of the shared errors.
-    """
-
-    carried: FloatArray
-    left: FloatArray
-    shared: FloatArray
-    mean: FloatArray
+    carried: FloatArray  #: ``(d, 6)`` units of place for each sigma of a shared error.
+    left: FloatArray  #: ``(d, d)`` lower triangular: a factor of the covariance of what is left of a place.
+    shared: FloatArray  #: ``(6, 6)`` lower triangular: of the shared errors'.
+    mean: FloatArray  #: ``(6,)`` of the shared errors.
 
     @classmethod
     def of(cls, places: FloatArray, shared: FloatArray, effective: float, width: float) -> "_Shape":

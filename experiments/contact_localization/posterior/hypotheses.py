@@ -11,22 +11,16 @@ _GOLDEN = 0.6180339887498949
 
 @dataclass(frozen=True, eq=False)
 class Hypotheses:
-    """Weighted places of the gel's centre at the first contact.
+    """Weighted places of the gel's centre at the first contact."""
 
-    Attributes:
-        gels: ``(n, 3)`` metres, in the object's frame.
-        yaws: ``(n,)`` rad away from the nominal one.
-        log_weights: ``(n,)`` nats, the greatest 0.
-        shared: ``(n, 6)`` errors that all contacts share (``noise.SharedNoise``); None where not named.
-        log_drawn: ``(n,)`` nats, up to a constant: the density that each was drawn from, by one over which
-            it is weighed; None where all were drawn alike.
-    """
-
-    gels: FloatArray
-    yaws: FloatArray
-    log_weights: FloatArray
+    gels: FloatArray  #: ``(n, 3)`` metres, in the object's frame.
+    yaws: FloatArray  #: ``(n,)`` rad away from the nominal one.
+    log_weights: FloatArray  #: ``(n,)`` nats, the greatest 0.
     shared: FloatArray | None = None
+    """``(n, 6)`` errors that all contacts share (``noise.SharedNoise``); None where not named."""
     log_drawn: FloatArray | None = None
+    """``(n,)`` nats, up to a constant: the density that each was drawn from, by one over which it is weighed;
+    None where all were drawn alike."""
 
     @property
     def weights(self) -> FloatArray:

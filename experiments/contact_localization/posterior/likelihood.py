@@ -19,37 +19,24 @@ _GOOD = -0.5
 
 @dataclass(frozen=True)
 class GeometryNoise:
-    """How far a contact may lie from the surface that the arm puts it on.
+    """How far a contact may lie from the surface that the arm puts it on."""
 
-    Attributes:
-        gap: metres, one sigma: arm, gel centre, shape.
-        gap_per_metre: metres of sigma for each metre between the contact and the anchor: the
-            object's scale and tilt.
-        free_angle: rad between tool and normal that cost nothing: the planner may tilt so far.
-        angle: rad, one sigma beyond it.
-        cap: the most that one contact may cost, nats; a slipped contact costs no more.
-    """
-
-    gap: float = 0.8e-3
+    gap: float = 0.8e-3  #: metres, one sigma: arm, gel centre, shape.
     gap_per_metre: float = 8.0e-3
+    """metres of sigma for each metre between the contact and the anchor: the object's scale and tilt."""
     free_angle: float = np.radians(16.0)
-    angle: float = np.radians(2.0)
-    cap: float = 10.0
+    """rad between tool and normal that cost nothing: the planner may tilt so far."""
+    angle: float = np.radians(2.0)  #: rad, one sigma beyond it.
+    cap: float = 10.0  #: the most that one contact may cost, nats; a slipped contact costs no more.
 
 
 @dataclass(frozen=True, eq=False)
 class Arrangement:
-    """The contacts relative to the anchor, for every yaw, in the object's frame.
+    """The contacts relative to the anchor, for every yaw, in the object's frame."""
 
-    Attributes:
-        anchor: index of the contact that hypotheses place on the surface.
-        offsets: ``(yaws, contacts, 3)`` metres from the anchor.
-        axes: ``(yaws, contacts, 3)`` unit: where the tool pointed.
-    """
-
-    anchor: int
-    offsets: FloatArray
-    axes: FloatArray
+    anchor: int  #: index of the contact that hypotheses place on the surface.
+    offsets: FloatArray  #: ``(yaws, contacts, 3)`` metres from the anchor.
+    axes: FloatArray  #: ``(yaws, contacts, 3)`` unit: where the tool pointed.
 
     def gap_sigmas(self, noise: GeometryNoise) -> FloatArray:
         """``(contacts,)`` metres."""

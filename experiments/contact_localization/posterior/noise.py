@@ -23,46 +23,32 @@ UNKNOWNS = 6
 
 @dataclass(frozen=True)
 class SharedNoise:
-    """One sigma of what contacts share, and of what is left to each.
+    """One sigma of what contacts share, and of what is left to each."""
 
-    Attributes:
-        tilt: rad, of the object about base x and about base y.
-        scale: of the object's true size over its model's, less 1.
-        gel_centre: metres, of the gel's centre along each axis of its own frame.
-        shift: metres, left to each contact in the plane of the gel: the arm, and the shape there.
-        depth: metres, the same across it.
-        per_metre: metres of sigma left for each metre between contacts: what a shape's
-            error is not, a scale.
-    """
-
-    tilt: float = USUAL.tilt
-    scale: float = USUAL.scale
-    gel_centre: float = USUAL.gel_centre
+    tilt: float = USUAL.tilt  #: rad, of the object about base x and about base y.
+    scale: float = USUAL.scale  #: of the object's true size over its model's, less 1.
+    gel_centre: float = USUAL.gel_centre  #: metres, of the gel's centre along each axis of its own frame.
     shift: float = USUAL.arm
-    depth: float = USUAL.arm
+    """metres, left to each contact in the plane of the gel: the arm, and the shape there."""
+    depth: float = USUAL.arm  #: metres, the same across it.
     per_metre: float = 2.0e-3
+    """metres of sigma left for each metre between contacts: what a shape's error is not, a scale."""
 
 
 @dataclass(frozen=True)
 class Noise:
-    """The noise of every term, as measured on calibration runs.
+    """The noise of every term, as measured on calibration runs."""
 
-    Attributes:
-        geometry: of places and tool axes.
-        unread: the same where no image is read: how far the gel was pressed in, and past which edge, is not
-            known there, so that the surface met may face elsewhere than the one that was aimed at.
-        touch: of the images.
-        temperature: factor on the images' share: their errors are shared between contacts.
-        shared: of what all contacts share, and of what is left to each where that is named.
-        floor: factor on what regions are widened by beside the hypotheses' own spread (``estimate.FLOORS``).
-    """
-
-    geometry: GeometryNoise = field(default_factory=GeometryNoise)
+    geometry: GeometryNoise = field(default_factory=GeometryNoise)  #: of places and tool axes.
     unread: GeometryNoise = field(default_factory=lambda: GeometryNoise(gap=1.2e-3, angle=np.radians(4.0)))
-    touch: TouchNoise = field(default_factory=TouchNoise)
-    temperature: float = 0.8
+    """the same where no image is read: how far the gel was pressed in, and past which edge, is not known
+    there, so that the surface met may face elsewhere than the one that was aimed at."""
+    touch: TouchNoise = field(default_factory=TouchNoise)  #: of the images.
+    temperature: float = 0.8  #: factor on the images' share: their errors are shared between contacts.
     shared: SharedNoise = field(default_factory=SharedNoise)
+    """of what all contacts share, and of what is left to each where that is named."""
     floor: float = 1.0
+    """factor on what regions are widened by beside the hypotheses' own spread (``estimate.FLOORS``)."""
 
 
 def moves(noise: SharedNoise, places: FloatArray, attitudes: FloatArray, members: BoolArray) -> FloatArray:

@@ -38,17 +38,11 @@ TEMPERATURE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Particles:
-    """Where the filter believes the last contact to be.
+    """Where the filter believes the last contact to be."""
 
-    Attributes:
-        points: ``(n, 3)`` metres, on the surface.
-        yaws: ``(n,)`` rad away from the nominal one.
-        log_weights: ``(n,)`` nats, the greatest 0.
-    """
-
-    points: FloatArray
-    yaws: FloatArray
-    log_weights: FloatArray
+    points: FloatArray  #: ``(n, 3)`` metres, on the surface.
+    yaws: FloatArray  #: ``(n,)`` rad away from the nominal one.
+    log_weights: FloatArray  #: ``(n,)`` nats, the greatest 0.
 
     @property
     def weights(self) -> FloatArray:

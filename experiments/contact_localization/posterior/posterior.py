@@ -33,36 +33,22 @@ _GOLDEN = 0.6180339887498949
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """One place the contact may be.
+    """One place the contact may be."""
 
-    Attributes:
-        position: ``(3,)`` metres, mean of the mode, in the object's frame.
-        weight: its share of the posterior.
-        covariance: ``(3, 3)`` square metres.
-    """
-
-    position: FloatArray
-    weight: float
-    covariance: FloatArray
+    position: FloatArray  #: ``(3,)`` metres, mean of the mode, in the object's frame.
+    weight: float  #: its share of the posterior.
+    covariance: FloatArray  #: ``(3, 3)`` square metres.
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """The surface samples that hold a stated share of the posterior, most probable first.
+    """The surface samples that hold a stated share of the posterior, most probable first."""
 
-    Attributes:
-        share: of the posterior.
-        points: ``(n, 3)`` metres: the samples inside.
-        area: square metres that they stand for.
-        surface: the samples that it was chosen from.
-        inside: ``(samples,)`` whether each belongs.
-    """
-
-    share: float
-    points: FloatArray
-    area: float
-    surface: Surface
-    inside: BoolArray
+    share: float  #: of the posterior.
+    points: FloatArray  #: ``(n, 3)`` metres: the samples inside.
+    area: float  #: square metres that they stand for.
+    surface: Surface  #: the samples that it was chosen from.
+    inside: BoolArray  #: ``(samples,)`` whether each belongs.
 
     def contains(self, point_in_object: FloatArray) -> bool:
         """Whether the sample nearest to a ``(3,)`` point of the surface belongs."""

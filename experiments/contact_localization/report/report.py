@@ -41,19 +41,12 @@ from harness.twin.rehearsal import predict_contact
 
 @dataclass(frozen=True)
 class SweepPoint:
-    """One level of accuracy on one recording.
+    """One level of accuracy on one recording."""
 
-    Attributes:
-        name: of the level.
-        accuracy: the dials.
-        seconds_a_contact: of the estimate, samples of the surface prepared.
-        error: m, of the last contact.
-    """
-
-    name: str
-    accuracy: Accuracy
-    seconds_a_contact: float
-    error: float
+    name: str  #: of the level.
+    accuracy: Accuracy  #: the dials.
+    seconds_a_contact: float  #: of the estimate, samples of the surface prepared.
+    error: float  #: m, of the last contact.
 
 
 LEVELS: dict[str, Setting] = {

@@ -189,19 +189,12 @@ _DISTANCE = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Spectrogram:
-    """Levels of a sound over time and frequency.
+    """Levels of a sound over time and frequency."""
 
-    Attributes:
-        times: ``(n,)`` s from the strike, the middle of each frame.
-        frequencies: ``(f,)`` Hz.
-        levels: ``(f, n)`` dB against the loudest, down to -90.
-        loudest: Pa, rms of the loudest line.
-    """
-
-    times: FloatArray
-    frequencies: FloatArray
-    levels: FloatArray
-    loudest: float
+    times: FloatArray  #: ``(n,)`` s from the strike, the middle of each frame.
+    frequencies: FloatArray  #: ``(f,)`` Hz.
+    levels: FloatArray  #: ``(f, n)`` dB against the loudest, down to -90.
+    loudest: float  #: Pa, rms of the loudest line.
 
 
 @dataclass(frozen=True, eq=False)

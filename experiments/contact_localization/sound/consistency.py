@@ -51,21 +51,13 @@ _STRANGE = "by its sound this may be another object, or one of another wall or m
 
 @dataclass(frozen=True, eq=False)
 class SoundFit:
-    """How contacts fit the best hypothesis without their images.
+    """How contacts fit the best hypothesis without their images."""
 
-    Attributes:
-        places: ``(contacts,)`` nats of each contact's place and tool axis, 0 at best.
-        yaw: nats of the object's yaw, 0 at best.
-        sound: nats over a sound that says nothing.
-        resonances: how many were heard.
-        unexplained: how many of them no mode explains.
-    """
-
-    places: FloatArray
-    yaw: float
-    sound: float
-    resonances: int
-    unexplained: int
+    places: FloatArray  #: ``(contacts,)`` nats of each contact's place and tool axis, 0 at best.
+    yaw: float  #: nats of the object's yaw, 0 at best.
+    sound: float  #: nats over a sound that says nothing.
+    resonances: int  #: how many were heard.
+    unexplained: int  #: how many of them no mode explains.
 
     @property
     def total(self) -> float:

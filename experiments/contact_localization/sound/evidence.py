@@ -17,15 +17,10 @@ from harness.strikes.peaks import analyse
 
 @dataclass(frozen=True, eq=False)
 class StrikeEvidence:
-    """The sound of a run's strikes.
+    """The sound of a run's strikes."""
 
-    Attributes:
-        term: of the posterior.
-        struck: ``(K,)`` indices of the contacts that were struck.
-    """
-
-    term: SoundTerm
-    struck: IntArray
+    term: SoundTerm  #: of the posterior.
+    struck: IntArray  #: ``(K,)`` indices of the contacts that were struck.
 
     def nats(self, search: Search, at: Hypotheses, between: bool = False) -> FloatArray:
         """``(n,)`` nats of hypotheses, see ``sound_nats``; 0 where sound says nothing."""

@@ -30,26 +30,17 @@ _CANDIDATES = 16
 
 @dataclass(frozen=True, eq=False)
 class GainTable:
-    """The modes at a surface's samples and at the nodes of their own mesh, made once an object.
+    """The modes at a surface's samples and at the nodes of their own mesh, made once an object."""
 
-    Attributes:
-        surface: whose samples; gives the sample nearest to any place.
-        shapes: ``(samples + nodes, m, 3)`` 1/sqrt(kg), float32.
-        mean_squares: ``(m,)`` 1/kg: of each mode's gain along the normal, over the samples.
-        nodes: ``(nodes, 3)`` metres.
-        faces: ``(f, 3)`` nodes of the mesh's surface.
-        near_faces: ``(samples, k)`` faces about each sample.
-        rotation_pairs: ``(m - 1,)`` whether a mode and the next one are a pair that a rotation about the
-            object's axis turns into each other (``find_rotation_pairs``).
-    """
-
-    surface: Surface
-    shapes: AnyArray
-    mean_squares: FloatArray
-    nodes: FloatArray
-    faces: IntArray
-    near_faces: AnyArray
+    surface: Surface  #: whose samples; gives the sample nearest to any place.
+    shapes: AnyArray  #: ``(samples + nodes, m, 3)`` 1/sqrt(kg), float32.
+    mean_squares: FloatArray  #: ``(m,)`` 1/kg: of each mode's gain along the normal, over the samples.
+    nodes: FloatArray  #: ``(nodes, 3)`` metres.
+    faces: IntArray  #: ``(f, 3)`` nodes of the mesh's surface.
+    near_faces: AnyArray  #: ``(samples, k)`` faces about each sample.
     rotation_pairs: BoolArray
+    """``(m - 1,)`` whether a mode and the next one are a pair that a rotation about the object's axis turns
+    into each other (``find_rotation_pairs``)."""
 
     @property
     def at_samples(self) -> AnyArray:

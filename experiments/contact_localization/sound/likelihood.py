@@ -38,69 +38,46 @@ _NEGLIGIBLE = -6.0
 
 @dataclass(frozen=True)
 class SoundNoise:
-    """How far sound may differ from what the modes say.
-
-    Attributes:
-        spreads: of a strike's share at a peak, in units of the mode's rms gain over the surface; some
-            modes are as they were computed and some hardly, and each peak is weighed under every one.
-        frequency: relative, one sigma of a mode's frequency about the common scale.
-        scale: relative, one sigma of the common scale.
-        scale_limits: within which a common scale is looked for.
-        scale_step: between the logarithms of the common scales that are weighed; as ``frequency`` or finer.
-        scale_weight: factor on the nats by which two lists of frequencies prefer a scale.
-        clutter: share of peaks that no mode explains.
-        weight: factor on a peak's nats, beside images: the model's errors are shared between peaks.
-        aside: metres, one sigma along each axis of the object, beside images: by so much places that sound
-            tells are off together, as its modes, the hammer's mount and the object's attitude are.
-        alone: ``weight`` by sound alone, where nothing names the errors that contacts share.
-        group: modes whose frequencies differ by less than this share mix freely.
-        pair: relative difference in frequency up to which the two modes of a round object's pair mix freely.
-        most: modes in one group at most; at most ``density.MOST_RANK``.
-    """
+    """How far sound may differ from what the modes say."""
 
     spreads: tuple[float, ...] = (0.1, 0.4)
-    frequency: float = 0.02
-    scale: float = 0.05
-    scale_limits: tuple[float, float] = (0.85, 1.15)
+    """of a strike's share at a peak, in units of the mode's rms gain over the surface; some modes are as they
+    were computed and some hardly, and each peak is weighed under every one."""
+    frequency: float = 0.02  #: relative, one sigma of a mode's frequency about the common scale.
+    scale: float = 0.05  #: relative, one sigma of the common scale.
+    scale_limits: tuple[float, float] = (0.85, 1.15)  #: within which a common scale is looked for.
     scale_step: float = 0.015
-    scale_weight: float = 0.3
-    clutter: float = 0.2
+    """between the logarithms of the common scales that are weighed; as ``frequency`` or finer."""
+    scale_weight: float = 0.3  #: factor on the nats by which two lists of frequencies prefer a scale.
+    clutter: float = 0.2  #: share of peaks that no mode explains.
     weight: float = 0.5
+    """factor on a peak's nats, beside images: the model's errors are shared between peaks."""
     aside: float = 1.0e-3
-    alone: float = 0.2
-    group: float = 0.01
+    """metres, one sigma along each axis of the object, beside images: by so much places that sound tells are
+    off together, as its modes, the hammer's mount and the object's attitude are."""
+    alone: float = 0.2  #: ``weight`` by sound alone, where nothing names the errors that contacts share.
+    group: float = 0.01  #: modes whose frequencies differ by less than this share mix freely.
     pair: float = 0.05
-    most: int = 3
+    """relative difference in frequency up to which the two modes of a round object's pair mix freely."""
+    most: int = 3  #: modes in one group at most; at most ``density.MOST_RANK``.
 
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """Common factors between a real object's frequencies and its model's.
+    """Common factors between a real object's frequencies and its model's."""
 
-    Attributes:
-        factors: ``(S,)`` real frequency over the model's, most probable first.
-        log_shares: ``(S,)`` nats, of shares that sum to 1.
-    """
-
-    factors: FloatArray
-    log_shares: FloatArray
+    factors: FloatArray  #: ``(S,)`` real frequency over the model's, most probable first.
+    log_shares: FloatArray  #: ``(S,)`` nats, of shares that sum to 1.
 
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Which group of modes may sound at which peak, pairs of a peak side by side.
+    """Which group of modes may sound at which peak, pairs of a peak side by side."""
 
-    Attributes:
-        starts: ``(P + 1,)`` first pair of each peak.
-        groups: ``(Q,)`` group of each pair.
-        shares: ``(S, Q)`` prior share of a pair in its peak, under each scale.
-        clutter: ``(S, P)`` share left for anything else.
-    """
-
-    starts: IntArray
-    groups: IntArray
-    shares: FloatArray
-    clutter: FloatArray
+    starts: IntArray  #: ``(P + 1,)`` first pair of each peak.
+    groups: IntArray  #: ``(Q,)`` group of each pair.
+    shares: FloatArray  #: ``(S, Q)`` prior share of a pair in its peak, under each scale.
+    clutter: FloatArray  #: ``(S, P)`` share left for anything else.
 
     def under(self, scale: int) -> "Pairs":
         """The same, were one scale the only one."""
@@ -110,29 +87,18 @@ class Pairs:
 
 @dataclass(frozen=True)
 class ModeRow:
-    """One row of the table of peaks and modes.
+    """One row of the table of peaks and modes."""
 
-    Attributes:
-        frequency: Hz, of the peak.
-        damping: 1/s, as heard.
-        residual: share of the peak's band that is not one waveform.
-        level: dB against the strongest peak.
-        modes: numbers of the matched group's modes, from 0; empty for a peak that no mode explains.
-        model_frequency: Hz, of the matched modes, under the scale; 0 where there is none.
-        model_damping: 1/s, of the matched modes; 0 where there is none.
-        probability: of the match.
-        nats: that the peak adds at the given places, over a peak that says nothing.
-    """
-
-    frequency: float
-    damping: float
-    residual: float
-    level: float
+    frequency: float  #: Hz, of the peak.
+    damping: float  #: 1/s, as heard.
+    residual: float  #: share of the peak's band that is not one waveform.
+    level: float  #: dB against the strongest peak.
     modes: tuple[int, ...]
-    model_frequency: float
-    model_damping: float
-    probability: float
-    nats: float
+    """numbers of the matched group's modes, from 0; empty for a peak that no mode explains."""
+    model_frequency: float  #: Hz, of the matched modes, under the scale; 0 where there is none.
+    model_damping: float  #: 1/s, of the matched modes; 0 where there is none.
+    probability: float  #: of the match.
+    nats: float  #: that the peak adds at the given places, over a peak that says nothing.
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,12 +122,7 @@ class _Struck:
 
 
 class SoundTerm:
-    """The sounds of one run as a term of its posterior.
-
-    Attributes:
-        evidence: what the strikes said.
-        scales: frequency scales between object and model, most probable first.
-    """
+    """The sounds of one run as a term of its posterior."""
 
     def __init__(
         self,
@@ -186,12 +147,13 @@ class SoundTerm:
         noise = noise or SoundNoise()
         if not 1 <= noise.most <= MOST_RANK:
             raise WrongUse(f"groups of {noise.most} modes were asked for; 1 to {MOST_RANK} can be weighed")
-        self.evidence = evidence
+        self.evidence = evidence  #: what the strikes said.
         self._table, self._modes, self._material, self._noise = table, modes, material, noise
         self._starts = group_starts(modes.frequencies, table.rotation_pairs, noise)
         self._peaks = evidence.peaks if len(modes.frequencies) else ()
         frequencies = np.array([peak.frequency for peak in self._peaks])
         self.scales: Scales = likely_scales(frequencies, modes.frequencies, noise)
+        """frequency scales between object and model, most probable first."""
         self._pairs = pairs_of(frequencies, self._group_frequencies(), self.scales.factors, noise)
         self._gain_scales = self._unit_gains()
 

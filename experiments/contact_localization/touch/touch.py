@@ -35,28 +35,21 @@ CONTACT_THRESHOLD = 0.12e-3
 
 @dataclass(frozen=True)
 class TouchNoise:
-    """How far a recovered height map may be from the predicted one.
-
-    Attributes:
-        rms: metres, root mean square over the touched area at the true place, one sigma.
-        tilt: rad, one sigma about each axis of the image: sensor frame and object's attitude.
-        spin: rad, one sigma of the image's turn in its own plane.
-        skirt: metres, sigma of the blur that stands for the gel hanging from the contact.
-        edge: metres, sigma of the blur over the contact's own edges: what the sensor cannot resolve.
-        shift: metres, one sigma in the plane of the gel of where the arm says a contact was
-            relative to the others.
-        depth: metres, one sigma across it.
-        cap: the most that one contact may cost, nats.
-    """
+    """How far a recovered height map may be from the predicted one."""
 
     rms: float = USUAL.gel_depth
+    """metres, root mean square over the touched area at the true place, one sigma."""
     tilt: float = np.radians(1.75)
-    spin: float = USUAL.gel_yaw
-    skirt: float = 1.0e-3
+    """rad, one sigma about each axis of the image: sensor frame and object's attitude."""
+    spin: float = USUAL.gel_yaw  #: rad, one sigma of the image's turn in its own plane.
+    skirt: float = 1.0e-3  #: metres, sigma of the blur that stands for the gel hanging from the contact.
     edge: float = 0.6e-3
+    """metres, sigma of the blur over the contact's own edges: what the sensor cannot resolve."""
     shift: float = 0.6e-3
-    depth: float = 0.6e-3
-    cap: float = 12.0
+    """metres, one sigma in the plane of the gel of where the arm says a contact was relative to the
+    others."""
+    depth: float = 0.6e-3  #: metres, one sigma across it.
+    cap: float = 12.0  #: the most that one contact may cost, nats.
 
     @property
     def sigmas(self) -> Sigmas:
@@ -79,25 +72,18 @@ class TouchNoise:
 
 @dataclass(frozen=True, eq=False)
 class TouchMap:
-    """What the gel read at one contact, reduced to what the term compares.
+    """What the gel read at one contact, reduced to what the term compares."""
 
-    Attributes:
-        heights: ``(rows, columns)`` metres of indentation, at ``pitch``.
-        pitch: metres.
-        touched: ``(n, 2)`` row and column of the pixels surely in contact; empty for a contact
-            that the image does not show.
-        flat: ``(rows, columns)`` where the gel is level: pressed by something level, or at rest
-            beyond an edge too steep for its height to be read from the colour.
-        skirt: ``(m,)`` one half of the skirt's kernel, from its centre out.
-        edge: ``(m,)`` one half of the kernel that softens the contact's own edges.
-    """
-
-    heights: FloatArray
-    pitch: float
+    heights: FloatArray  #: ``(rows, columns)`` metres of indentation, at ``pitch``.
+    pitch: float  #: metres.
     touched: IntArray
+    """``(n, 2)`` row and column of the pixels surely in contact; empty for a contact that the image does not
+    show."""
     flat: BoolArray
-    skirt: FloatArray
-    edge: FloatArray
+    """``(rows, columns)`` where the gel is level: pressed by something level, or at rest beyond an edge too
+    steep for its height to be read from the colour."""
+    skirt: FloatArray  #: ``(m,)`` one half of the skirt's kernel, from its centre out.
+    edge: FloatArray  #: ``(m,)`` one half of the kernel that softens the contact's own edges.
 
     @property
     def reading(self) -> Reading:
@@ -107,17 +93,11 @@ class TouchMap:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """One contact as the estimator knows it.
+    """One contact as the estimator knows it."""
 
-    Attributes:
-        base_from_gel: ``(4, 4)``; its translation is used only against other contacts'.
-        touch: what the gel read; None for a contact whose image must not be used.
-        coarse: the same at half the resolution, for a first look at many places.
-    """
-
-    base_from_gel: FloatArray
-    touch: TouchMap | None = None
-    coarse: TouchMap | None = None
+    base_from_gel: FloatArray  #: ``(4, 4)``; its translation is used only against other contacts'.
+    touch: TouchMap | None = None  #: what the gel read; None for a contact whose image must not be used.
+    coarse: TouchMap | None = None  #: the same at half the resolution, for a first look at many places.
 
     @property
     def shows_contact(self) -> bool:

@@ -55,49 +55,30 @@ NINE_TENTHS = 1.645
 
 @dataclass(frozen=True, eq=False)
 class MaterialGuess:
-    """What the object may be made of.
+    """What the object may be made of."""
 
-    Attributes:
-        model: of the object, were it that.
-        sigma: of the logarithm of sqrt(E / density).
-    """
-
-    model: RingingModel
-    sigma: float
+    model: RingingModel  #: of the object, were it that.
+    sigma: float  #: of the logarithm of sqrt(E / density).
 
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """The sizes at which the modes are where the peaks are, were the object of one material.
+    """The sizes at which the modes are where the peaks are, were the object of one material."""
 
-    Attributes:
-        belief: over the size, were the material and the wall exactly as stated.
-        log_evidence: of the material, logarithm.
-        sigma: of the logarithm of the size, which the material and the wall leave open.
-        speed: sqrt(E / density) over that of the material stated first.
-        nats: a peak over chance at the best size.
-    """
-
-    belief: Belief
-    log_evidence: float
-    sigma: float
-    speed: float
-    nats: float
+    belief: Belief  #: over the size, were the material and the wall exactly as stated.
+    log_evidence: float  #: of the material, logarithm.
+    sigma: float  #: of the logarithm of the size, which the material and the wall leave open.
+    speed: float  #: sqrt(E / density) over that of the material stated first.
+    nats: float  #: a peak over chance at the best size.
 
 
 @dataclass(frozen=True, eq=False)
 class Hearing:
-    """The answer by sound.
+    """The answer by sound."""
 
-    Attributes:
-        belief: over the size.
-        matches: one a material; that stated first is first.
-        seconds: s of the estimate.
-    """
-
-    belief: Belief
-    matches: tuple[Match, ...]
-    seconds: float
+    belief: Belief  #: over the size.
+    matches: tuple[Match, ...]  #: one a material; that stated first is first.
+    seconds: float  #: s of the estimate.
 
     @property
     def match(self) -> Belief:

@@ -20,18 +20,13 @@ LISTENED_FROM = 0.5
 
 @dataclass(frozen=True, eq=False)
 class RingingModel:
-    """The modes of an object at its nominal size, and how strongly a strike at a middling place rings each.
+    """The modes of an object at its nominal size, and how strongly a typical strike excites each."""
 
-    Attributes:
-        frequencies: ``(m,)`` Hz, ascending.
-        amplitudes: ``(m,)`` Pa s / N, rms over the surface: gain along the normal times radiation. The
-            transfer function at a resonance is half of it over the decay.
-        material: whose damping they have.
-    """
-
-    frequencies: FloatArray
+    frequencies: FloatArray  #: ``(m,)`` Hz, ascending.
     amplitudes: FloatArray
-    material: Material
+    """``(m,)`` Pa s / N, rms over the surface: gain along the normal times radiation. The transfer function
+    at a resonance is half of it over the decay."""
+    material: Material  #: whose damping they have.
 
     @classmethod
     def of(cls, modes: Modes, material: Material, distance: float = LISTENED_FROM) -> "RingingModel":
@@ -101,21 +96,13 @@ _PARTS = 16
 
 @dataclass(frozen=True, eq=False)
 class Peaks:
-    """What was heard.
+    """What was heard."""
 
-    Attributes:
-        frequencies: ``(p,)`` Hz.
-        levels: ``(p,)`` dB re 1 Pa/N.
-        band: Hz, from and to, that the strikes excited.
-        window_decay: 1/s that the analysis adds to every decay.
-        decays: ``(p,)`` 1/s, the window's taken off.
-    """
-
-    frequencies: FloatArray
-    levels: FloatArray
-    band: tuple[float, float]
-    window_decay: float
-    decays: FloatArray
+    frequencies: FloatArray  #: ``(p,)`` Hz.
+    levels: FloatArray  #: ``(p,)`` dB re 1 Pa/N.
+    band: tuple[float, float]  #: Hz, from and to, that the strikes excited.
+    window_decay: float  #: 1/s that the analysis adds to every decay.
+    decays: FloatArray  #: ``(p,)`` 1/s, the window's taken off.
 
     def apart(self) -> "Peaks":
         """Without those that stand within half a resonance's width of a louder one, which they are again.
@@ -188,18 +175,12 @@ class UnsolvedModes:
     They go on at the spacing of those below, as a thin wall's do (Cremer, Heckl and Petersson,
     Structure-borne sound, 2005). Without them a peak up there would be chance at a large size and a mode's at
     a small one: things of a soft material, which have too many modes to solve all, would be called small.
-
-    Attributes:
-        top: Hz, of the nominal object, from where on modes were not solved.
-        per_hz: modes a hertz of it.
-        amplitude: Pa s / N, of a middling one.
-        material: whose damping they have.
     """
 
-    top: float
-    per_hz: float
-    amplitude: float
-    material: Material
+    top: float  #: Hz, of the nominal object, from where on modes were not solved.
+    per_hz: float  #: modes a hertz of it.
+    amplitude: float  #: Pa s / N, of a middling one.
+    material: Material  #: whose damping they have.
 
     @classmethod
     def of(cls, model: RingingModel) -> "UnsolvedModes":

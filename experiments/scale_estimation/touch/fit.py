@@ -50,21 +50,14 @@ _SIZE, _X, _Y, _YAW, _Z, _TILT_X, _TILT_Y, _DEPTH = range(UNKNOWNS)
 
 @dataclass(frozen=True)
 class StandErrors:
-    """How well it is known where the object stands: standard deviations.
+    """How well it is known where the object stands: standard deviations."""
 
-    Attributes:
-        place: m, per axis of the plane.
-        support: m, of the height.
-        tilt: rad, per axis, of the object's own stand.
-        depth: m, along its axis, of where the gel is on the arm and how deep it reads: of all contacts alike.
-        same_place: largest differences between two contacts that count as one.
-    """
-
-    place: float = 0.1
-    support: float = 1.0e-3
-    tilt: float = float(np.radians(0.5))
+    place: float = 0.1  #: m, per axis of the plane.
+    support: float = 1.0e-3  #: m, of the height.
+    tilt: float = float(np.radians(0.5))  #: rad, per axis, of the object's own stand.
     depth: float = 0.54e-3
-    same_place: PlaceTolerance = USUAL_PLACE
+    """m, along its axis, of where the gel is on the arm and how deep it reads: of all contacts alike."""
+    same_place: PlaceTolerance = USUAL_PLACE  #: largest differences between two contacts that count as one.
 
     @classmethod
     def at(
@@ -84,21 +77,13 @@ class StandErrors:
 
 @dataclass(frozen=True, eq=False)
 class Stand:
-    """The nominal object as it stands, upright in base, its bottom's middle at the origin.
+    """The nominal object as it stands, upright in base, its bottom's middle at the origin."""
 
-    Attributes:
-        points: ``(n, 3)`` m, samples of its surface.
-        normals: ``(n, 3)`` unit, outward.
-        spacing: m between samples.
-        place: ``(3,)`` m in base: where that middle nominally is.
-        errors: of that.
-    """
-
-    points: FloatArray
-    normals: FloatArray
-    spacing: float
-    place: FloatArray
-    errors: StandErrors = StandErrors()
+    points: FloatArray  #: ``(n, 3)`` m, samples of its surface.
+    normals: FloatArray  #: ``(n, 3)`` unit, outward.
+    spacing: float  #: m between samples.
+    place: FloatArray  #: ``(3,)`` m in base: where that middle nominally is.
+    errors: StandErrors = StandErrors()  #: of that.
 
     @classmethod
     def of(
@@ -214,9 +199,6 @@ class TouchProblem:
         patches: of the contacts.
         points: of each patch that are used; the first are spread the widest.
         slack: by which share a sample that is taken for the nearest may be farther than it.
-
-    Attributes:
-        places: number of different places that were touched; the contacts of one place count once.
     """
 
     def __init__(self, stand: Stand, patches: Sequence[Patch], points: int, slack: float = 0.0) -> None:
@@ -228,6 +210,7 @@ class TouchProblem:
         visited = places_of(patches, stand.errors.same_place)
         self._shares = weigh_repeated(visited)
         self.places = len(np.unique(visited))
+        """number of different places that were touched; the contacts of one place count once."""
 
     def refined(self, unknowns: FloatArray, rounds: int, fixed_size: bool) -> tuple[FloatArray, FloatArray]:
         """Downhill from each hypothesis.

@@ -26,18 +26,13 @@ BETWEEN = 1.5e-3
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Where a press met the object.
+    """Where a press met the object."""
 
-    Attributes:
-        points: ``(POINTS, 3)`` m in base.
-        normal: ``(3,)`` unit in base, out of the object: of the plane through them.
-        base_from_gel: ``(4, 4)`` pose of the gel as the arm reported it; None where the pose is unknown, and
-            the points and the normal then tell whether two contacts are at one place.
-    """
-
-    points: FloatArray
-    normal: FloatArray
+    points: FloatArray  #: ``(POINTS, 3)`` m in base.
+    normal: FloatArray  #: ``(3,)`` unit in base, out of the object: of the plane through them.
     base_from_gel: FloatArray | None = None
+    """``(4, 4)`` pose of the gel as the arm reported it; None where the pose is unknown, and the points and
+    the normal then tell whether two contacts are at one place."""
 
     @property
     def press_line(self) -> tuple[FloatArray, FloatArray]:

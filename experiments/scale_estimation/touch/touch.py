@@ -73,21 +73,13 @@ _FAR = 12.0
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """The answer by touch.
+    """The answer by touch."""
 
-    Attributes:
-        belief: over the size.
-        unknowns: ``(UNKNOWNS,)`` the best.
-        cost: of a contact, at the best.
-        seconds: s of the estimate.
-        places: number of different places that were touched.
-    """
-
-    belief: Belief
-    unknowns: FloatArray
-    cost: float
-    seconds: float
-    places: int = DOUBTED_PLACES
+    belief: Belief  #: over the size.
+    unknowns: FloatArray  #: ``(UNKNOWNS,)`` the best.
+    cost: float  #: of a contact, at the best.
+    seconds: float  #: s of the estimate.
+    places: int = DOUBTED_PLACES  #: number of different places that were touched.
 
     @property
     def is_doubted(self) -> bool:

@@ -36,15 +36,11 @@ is off far beyond a normal density. Found on 29 development runs (docs/results/s
 
 @dataclass(frozen=True, eq=False)
 class ShapelessAnswer:
-    """The answer about an object whose shape is not known.
+    """The answer about an object whose shape is not known."""
 
-    Attributes:
-        belief: over the size.
-        distance: from what was learnt, in units of the usual one; beyond 1 the belief is widened for it.
-    """
-
-    belief: Belief
+    belief: Belief  #: over the size.
     distance: float
+    """from what was learnt, in units of the usual one; beyond 1 the belief is widened for it."""
 
     @property
     def strange(self) -> bool:

@@ -32,17 +32,12 @@ _LEAST = 5.0e-3
 
 @dataclass(frozen=True, eq=False)
 class GelWay:
-    """A straight way of the gel.
-
-    Attributes:
-        end: ``(3,)`` m from where the object nominally stands: where it met it, or where the way ended.
-        direction: ``(3,)`` unit, along the way.
-        normal: ``(3,)`` unit, out of the object; None where the gel met nothing.
-    """
+    """A straight way of the gel."""
 
     end: FloatArray
-    direction: FloatArray
-    normal: FloatArray | None
+    """``(3,)`` m from where the object nominally stands: where it met it, or where the way ended."""
+    direction: FloatArray  #: ``(3,)`` unit, along the way.
+    normal: FloatArray | None  #: ``(3,)`` unit, out of the object; None where the gel met nothing.
 
     @classmethod
     def made(cls, base_from_gel: FloatArray, place: FloatArray, patch: Patch | None) -> "GelWay":

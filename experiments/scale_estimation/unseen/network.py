@@ -36,17 +36,11 @@ _GREATEST = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """What codes of a network's training inputs look like.
+    """What codes of a network's training inputs look like."""
 
-    Attributes:
-        middle: ``(MEMBERS, CODE)``.
-        whitening: ``(MEMBERS, CODE, CODE)``: takes their covariance to one.
-        usual: distance from the middle within which 99 of 100 inputs of shapes held out are.
-    """
-
-    middle: FloatArray
-    whitening: FloatArray
-    usual: float
+    middle: FloatArray  #: ``(MEMBERS, CODE)``.
+    whitening: FloatArray  #: ``(MEMBERS, CODE, CODE)``: takes their covariance to one.
+    usual: float  #: distance from the middle within which 99 of 100 inputs of shapes held out are.
 
     def distance(self, codes: FloatArray) -> float:
         """Of ``(MEMBERS, CODE)`` codes, the mean over the members."""
@@ -56,20 +50,13 @@ class Family:
 
 @dataclass(frozen=True, eq=False)
 class SizeNetwork:
-    """A trained network and how wide its answers are.
+    """A trained network and how wide its answers are."""
 
-    Attributes:
-        network: that runs it.
-        temperature: by which its logits are divided, so that nine tenths of shapes held out are within the
-            intervals.
-        family: of its inputs.
-        card: where it comes from and what it reaches.
-    """
-
-    network: Network
+    network: Network  #: that runs it.
     temperature: float
-    family: Family
-    card: Mapping[str, object]
+    """by which its logits are divided, so that nine tenths of shapes held out are within the intervals."""
+    family: Family  #: of its inputs.
+    card: Mapping[str, object]  #: where it comes from and what it reaches.
 
     def belief(self, inputs: Sequence[Mapping[str, FloatArray]], sizes: SizeRange) -> tuple[Belief, float]:
         """The mean of what is said of several views of one reading, and how far it is from the family.

@@ -24,21 +24,14 @@ USED = 18
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """A fitted quadratic.
+    """A fitted quadratic."""
 
-    Attributes:
-        middle: ``(d,)`` of the features.
-        spread: ``(d,)`` of them.
-        weights: ``(p,)`` of the products of the features so normalised; the constant first.
-        inverse: ``(p, p)`` inverse of the products' normal matrix, ridge included.
-        sigma: of the logarithm of the size, on shapes that were held out, where their products are usual.
-    """
-
-    middle: FloatArray
-    spread: FloatArray
-    weights: FloatArray
-    inverse: FloatArray
+    middle: FloatArray  #: ``(d,)`` of the features.
+    spread: FloatArray  #: ``(d,)`` of them.
+    weights: FloatArray  #: ``(p,)`` of the products of the features so normalised; the constant first.
+    inverse: FloatArray  #: ``(p, p)`` inverse of the products' normal matrix, ridge included.
     sigma: float
+    """of the logarithm of the size, on shapes that were held out, where their products are usual."""
 
     def size(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
         """``(n,)`` logarithms of the size over the mean width, and their deviations, of ``(n, d)`` features.

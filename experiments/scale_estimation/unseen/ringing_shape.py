@@ -29,15 +29,11 @@ _SPACED_BY = 20
 
 @dataclass(frozen=True, eq=False)
 class RingingShape:
-    """The modes of a shape, ``SOLVED_AT`` long and ``SOLVED_OF``.
+    """The modes of a shape, ``SOLVED_AT`` long and ``SOLVED_OF``."""
 
-    Attributes:
-        frequencies: ``(m,)`` Hz, ascending.
-        amplitudes: ``(PLACES, m)`` Pa / (N s): gain along the normal of a struck place times radiation.
-    """
-
-    frequencies: FloatArray
+    frequencies: FloatArray  #: ``(m,)`` Hz, ascending.
     amplitudes: FloatArray
+    """``(PLACES, m)`` Pa / (N s): gain along the normal of a struck place times radiation."""
 
     @classmethod
     def solved(cls, shape: HouseholdSolid, random: np.random.Generator) -> "RingingShape":

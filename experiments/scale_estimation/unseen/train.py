@@ -26,23 +26,14 @@ WITHOUT_TORCH = ("outline", REAL_SHAPES)
 
 @dataclass(frozen=True)
 class Profile:
-    """How much is made and for how long it is learnt.
+    """How much is made and for how long it is learnt."""
 
-    Attributes:
-        outlines: shapes whose outlines are fitted.
-        shapes: whose strikes and contacts are learnt.
-        strikes: samples of strikes of each.
-        contacts: explorations of each.
-        epochs: of sound, of touch and imprints.
-        members: networks of each sense.
-    """
-
-    outlines: int
-    shapes: int
-    strikes: int
-    contacts: int
-    epochs: tuple[int, int]
-    members: int = 3
+    outlines: int  #: shapes whose outlines are fitted.
+    shapes: int  #: whose strikes and contacts are learnt.
+    strikes: int  #: samples of strikes of each.
+    contacts: int  #: explorations of each.
+    epochs: tuple[int, int]  #: of sound, of touch and imprints.
+    members: int = 3  #: networks of each sense.
 
 
 PROFILES = MappingProxyType(

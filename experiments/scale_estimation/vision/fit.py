@@ -41,24 +41,15 @@ _AROUND = 600
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A camera and what stands before it, as the station and the scene state them.
+    """A camera and what stands before it, as the station and the scene state them."""
 
-    Attributes:
-        base_from_camera: ``(4, 4)``; x right, y down, z forward.
-        focal_px: pixels.
-        centre_px: (x, y) of the optical axis, pixels from the picture's corner.
-        standing: ``(n, 3)`` m, corners of the nominal object's convex hull upright in base, its anchor at the
-            origin.
-        place: ``(3,)`` m in base: where that middle nominally stands.
-        errors: of all this.
-    """
-
-    base_from_camera: FloatArray
-    focal_px: float
-    centre_px: tuple[float, float]
+    base_from_camera: FloatArray  #: ``(4, 4)``; x right, y down, z forward.
+    focal_px: float  #: pixels.
+    centre_px: tuple[float, float]  #: (x, y) of the optical axis, pixels from the picture's corner.
     standing: FloatArray
-    place: FloatArray
-    errors: CameraErrors = field(default_factory=CameraErrors)
+    """``(n, 3)`` m, corners of the nominal object's convex hull upright in base, its anchor at the origin."""
+    place: FloatArray  #: ``(3,)`` m in base: where that middle nominally stands.
+    errors: CameraErrors = field(default_factory=CameraErrors)  #: of all this.
 
     @cached_property
     def corners(self) -> FloatArray:
@@ -112,19 +103,14 @@ def _all_around() -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class OutlineFit:
-    """A place, turn and size of the object at which its outline is nearly that of the picture.
-
-    Attributes:
-        unknowns: ``(14,)``: logarithm of the size over the nominal one; metres along base x and y; yaw, rad;
-            tilts about x and y, rad; the camera's place, m, turn, rad, and logarithm of its focal length, off
-            from what is stated; the support's height, m, off.
-        cost: half the sum of squares, prior included.
-        rms: pixels, of the outline where it is not hidden.
-    """
+    """A place, turn and size of the object at which its outline is nearly that of the picture."""
 
     unknowns: FloatArray
-    cost: float
-    rms: float
+    """``(14,)``: logarithm of the size over the nominal one; metres along base x and y; yaw, rad; tilts about
+    x and y, rad; the camera's place, m, turn, rad, and logarithm of its focal length, off from what is
+    stated; the support's height, m, off."""
+    cost: float  #: half the sum of squares, prior included.
+    rms: float  #: pixels, of the outline where it is not hidden.
 
 
 class OutlineProblem:

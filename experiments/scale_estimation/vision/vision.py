@@ -46,17 +46,11 @@ _TURNS_APART = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """The answer by sight.
+    """The answer by sight."""
 
-    Attributes:
-        belief: over the size.
-        fit: the best.
-        seconds: s of the estimate.
-    """
-
-    belief: Belief
-    fit: OutlineFit
-    seconds: float
+    belief: Belief  #: over the size.
+    fit: OutlineFit  #: the best.
+    seconds: float  #: s of the estimate.
 
 
 def by_sight(view: View, outline: SeenOutline, nominal: float, sizes: SizeRange) -> Sight:
@@ -107,16 +101,12 @@ def _require_same(view: View, best: OutlineFit) -> None:
 
 @dataclass(frozen=True, eq=False)
 class SeenStand:
-    """How the object may stand, by a look.
+    """How the object may stand, by a look."""
 
-    Attributes:
-        unknowns: ``(4,)`` log of the size over the nominal one, x, y, m, yaw, rad.
-        farthest: ``(2,)`` m along x and y: one standard deviation of its place the way it is known worst, the
-            line of sight.
-    """
-
-    unknowns: FloatArray
+    unknowns: FloatArray  #: ``(4,)`` log of the size over the nominal one, x, y, m, yaw, rad.
     farthest: FloatArray
+    """``(2,)`` m along x and y: one standard deviation of its place the way it is known worst, the line of
+    sight."""
 
     @property
     def place_error(self) -> float:

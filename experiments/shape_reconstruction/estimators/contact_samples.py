@@ -20,21 +20,13 @@ _WIDER = 1.25
 
 @dataclass(frozen=True, eq=False)
 class ContactSamples:
-    """Places of the object's surface.
+    """Places of the object's surface."""
 
-    Attributes:
-        points: ``(n, 3)`` m in ``stand``.
-        normals: ``(n, 3)`` unit, out of the object.
-        sigmas: ``(n,)`` m, one standard deviation of each point along its normal.
-        normal_sigmas: ``(n,)`` rad, of each normal.
-        touches: ``(n,)`` which of ``evidence.contacts`` each is of.
-    """
-
-    points: FloatArray
-    normals: FloatArray
-    sigmas: FloatArray
-    normal_sigmas: FloatArray
-    touches: IntArray
+    points: FloatArray  #: ``(n, 3)`` m in ``stand``.
+    normals: FloatArray  #: ``(n, 3)`` unit, out of the object.
+    sigmas: FloatArray  #: ``(n,)`` m, one standard deviation of each point along its normal.
+    normal_sigmas: FloatArray  #: ``(n,)`` rad, of each normal.
+    touches: IntArray  #: ``(n,)`` which of ``evidence.contacts`` each is of.
 
     def of(self, rows: IntArray) -> "ContactSamples":
         """Some of them."""

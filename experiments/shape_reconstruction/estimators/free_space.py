@@ -45,17 +45,13 @@ def _depth_in_housing(evidence: ShapeEvidence, touch: GuardedTouch, points: Floa
 
 @dataclass(frozen=True, eq=False)
 class Silhouette:
-    """A mask as a signed distance in its picture, shifted to where the contacts want it.
+    """A mask as a signed distance in its picture, shifted to where the contacts want it."""
 
-    Attributes:
-        look: the picture's.
-        outside: ``(rows, columns)`` pixels from the border of mask and hidden pixels; below 0 within.
-        shift: ``(2,)`` pixels, x and y, by which places project farther than the camera's pose says.
-    """
-
-    look: SeenMask
+    look: SeenMask  #: the picture's.
     outside: FloatArray
+    """``(rows, columns)`` pixels from the border of mask and hidden pixels; below 0 within."""
     shift: FloatArray
+    """``(2,)`` pixels, x and y, by which places project farther than the camera's pose says."""
 
     @classmethod
     def of(cls, look: SeenMask, contacts: FloatArray) -> "Silhouette":

@@ -21,30 +21,20 @@ BAND = 3.0
 
 @dataclass(frozen=True, eq=False)
 class BodySurface:
-    """A closed surface of one piece.
+    """A closed surface of one piece."""
 
-    Attributes:
-        mesh: the surface, m.
-        notes: what was joined or removed, in short sentences; none where the field held one body.
-    """
-
-    mesh: Mesh
+    mesh: Mesh  #: the surface, m.
     notes: tuple[str, ...]
+    """what was joined or removed, in short sentences; none where the field held one body."""
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Corners of cubic cells.
+    """Corners of cubic cells."""
 
-    Attributes:
-        origin: ``(3,)`` m in ``stand``, of the first corner.
-        pitch: m between corners.
-        shape: corners along x, y, z.
-    """
-
-    origin: FloatArray
-    pitch: float
-    shape: tuple[int, int, int]
+    origin: FloatArray  #: ``(3,)`` m in ``stand``, of the first corner.
+    pitch: float  #: m between corners.
+    shape: tuple[int, int, int]  #: corners along x, y, z.
 
     @classmethod
     def over(cls, low: FloatArray, high: FloatArray, pitch: float) -> "Grid":

@@ -137,17 +137,13 @@ def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> ShapeEstimate
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """Predictions of left-out contacts by the field.
-
-    Attributes:
-        errors: ``(contacts,)`` rms distance of each from the field fitted without it, m; zero where thinning
-            kept no point of it.
-        outliers: distance by the index of the touch, m, of those more than ``DOUBTFUL`` standard deviations
-            off.
-    """
+    """Predictions of left-out contacts by the field."""
 
     errors: FloatArray
+    """``(contacts,)`` rms distance of each from the field fitted without it, m; zero where thinning kept no
+    point of it."""
     outliers: dict[int, float]
+    """distance by the index of the touch, m, of those more than ``DOUBTFUL`` standard deviations off."""
 
 
 @dataclass(frozen=True, eq=False)

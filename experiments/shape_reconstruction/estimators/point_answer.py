@@ -10,17 +10,12 @@ from harness.basics.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class PointEstimate:
-    """Places of an object's surface.
+    """Places of an object's surface."""
 
-    Attributes:
-        points: ``(n, 3)`` m in ``stand``.
-        seconds: of the estimate.
-        details: JSON values of what the estimator found beside.
-    """
-
-    points: FloatArray
-    seconds: float
+    points: FloatArray  #: ``(n, 3)`` m in ``stand``.
+    seconds: float  #: of the estimate.
     details: Mapping[str, object] = field(default_factory=dict)
+    """JSON values of what the estimator found beside."""
 
 
 def by_raw_points(evidence: ShapeEvidence) -> PointEstimate:

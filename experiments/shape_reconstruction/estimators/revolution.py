@@ -48,17 +48,11 @@ _UNKNOWN = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Revolution:
-    """An axis that contacts agree on.
+    """An axis that contacts agree on."""
 
-    Attributes:
-        centre: ``(2,)`` m, x and y of the axis in ``stand``.
-        share: of the horizontal parts of the normals that meet it.
-        of_body: ``(n,)`` which samples do: the others are a handle's, or whatever else stands out.
-    """
-
-    centre: FloatArray
-    share: float
-    of_body: BoolArray
+    centre: FloatArray  #: ``(2,)`` m, x and y of the axis in ``stand``.
+    share: float  #: of the horizontal parts of the normals that meet it.
+    of_body: BoolArray  #: ``(n,)`` which samples do: the others are a handle's, or whatever else stands out.
 
     def copies(self, samples: ContactSamples) -> tuple[FloatArray, FloatArray]:
         """``(m, 3)`` m and normals: the body's places turned about the axis, where nothing was touched."""
@@ -180,15 +174,11 @@ _ROOM_MARGIN = 20.0e-3
 
 @dataclass(frozen=True, eq=False)
 class TurnedRoom:
-    """What is free about an axis, over the distance from it and the height.
+    """What is free about an axis, over the distance from it and the height."""
 
-    Attributes:
-        centre: ``(2,)`` m, of the axis in ``stand``.
-        depth: ``(radii, heights)`` m, ``PITCH`` apart from zero, that a place is deep in it; below 0 beside.
-    """
-
-    centre: FloatArray
+    centre: FloatArray  #: ``(2,)`` m, of the axis in ``stand``.
     depth: FloatArray
+    """``(radii, heights)`` m, ``PITCH`` apart from zero, that a place is deep in it; below 0 beside."""
 
     def at(self, points: FloatArray) -> FloatArray:
         """``(n,)`` m that ``(n, 3)`` m are deep in it; below 0 beside it."""

@@ -30,21 +30,13 @@ rings and rods)."""
 
 @dataclass(frozen=True, eq=False)
 class SurfaceData:
-    """What is known of a field ``f`` that is 0 on a surface and grows outward by a metre a metre.
+    """What is known of a field ``f`` that is 0 on a surface and grows outward by a metre a metre."""
 
-    Attributes:
-        points: ``(n, 3)`` m, where ``values`` are known.
-        values: ``(n,)`` m.
-        sigmas: ``(n,)`` m, one standard deviation of each value.
-        normals: ``(n, 3)``, gradients there; ignored where ``normal_sigmas`` is infinite.
-        normal_sigmas: ``(n,)`` one standard deviation of each component.
-    """
-
-    points: FloatArray
-    values: FloatArray
-    sigmas: FloatArray
-    normals: FloatArray
-    normal_sigmas: FloatArray
+    points: FloatArray  #: ``(n, 3)`` m, where ``values`` are known.
+    values: FloatArray  #: ``(n,)`` m.
+    sigmas: FloatArray  #: ``(n,)`` m, one standard deviation of each value.
+    normals: FloatArray  #: ``(n, 3)``, gradients there; ignored where ``normal_sigmas`` is infinite.
+    normal_sigmas: FloatArray  #: ``(n,)`` one standard deviation of each component.
 
     def joined(self, other: "SurfaceData") -> "SurfaceData":
         """Both."""
@@ -59,23 +51,14 @@ class SurfaceData:
 
 @dataclass(frozen=True, eq=False)
 class ThinPlateField:
-    """A fitted field; lengths inside are shares of ``reach``.
+    """A fitted field; lengths inside are shares of ``reach``."""
 
-    Attributes:
-        centre: ``(3,)`` m.
-        reach: m, the ``R`` of the covariance.
-        data: that it was fitted to.
-        weights: ``(n, 4)`` of value and gradient at every place.
-        factor: ``(4 n, 4 n)`` lower Cholesky factor of the covariance of all data.
-        amplitude: of the covariance.
-    """
-
-    centre: FloatArray
-    reach: float
-    data: SurfaceData
-    weights: FloatArray
-    factor: FloatArray
-    amplitude: float
+    centre: FloatArray  #: ``(3,)`` m.
+    reach: float  #: m, the ``R`` of the covariance.
+    data: SurfaceData  #: that it was fitted to.
+    weights: FloatArray  #: ``(n, 4)`` of value and gradient at every place.
+    factor: FloatArray  #: ``(4 n, 4 n)`` lower Cholesky factor of the covariance of all data.
+    amplitude: float  #: of the covariance.
 
     def values(self, points: FloatArray) -> FloatArray:
         """``(m,)`` m: the mean field at ``(m, 3)`` points."""

@@ -43,17 +43,11 @@ _EVEN = np.linspace(0.0, 1.0, KNOTS)
 
 @dataclass(frozen=True, eq=False)
 class FamilyShape:
-    """One shape.
+    """One shape."""
 
-    Attributes:
-        name: its class.
-        code: ``(CODE_SIZE,)``: its kind and parts.
-        theta: ``(SIZE,)``, its numbers, about the origin.
-    """
-
-    name: str
-    code: IntArray
-    theta: FloatArray
+    name: str  #: its class.
+    code: IntArray  #: ``(CODE_SIZE,)``: its kind and parts.
+    theta: FloatArray  #: ``(SIZE,)``, its numbers, about the origin.
 
 
 def draw_shape(name: str, random: _Random) -> FamilyShape:

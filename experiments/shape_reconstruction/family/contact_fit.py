@@ -36,19 +36,12 @@ _MOVED_POINTS = 8
 
 @dataclass(frozen=True, eq=False)
 class ContactFit:
-    """Of every contact, in their order.
+    """Of every contact, in their order."""
 
-    Attributes:
-        sums: ``(contacts,)`` sums of squares, in standard deviations.
-        off: ``(contacts,)`` m rms between its points and the surface.
-        doubtful: ``(contacts,)`` whether it does not fit while most do.
-        others: cost of free places, of what the gel touched nothing of, and of rays of sight.
-    """
-
-    sums: FloatArray
-    off: FloatArray
-    doubtful: BoolArray
-    others: float
+    sums: FloatArray  #: ``(contacts,)`` sums of squares, in standard deviations.
+    off: FloatArray  #: ``(contacts,)`` m rms between its points and the surface.
+    doubtful: BoolArray  #: ``(contacts,)`` whether it does not fit while most do.
+    others: float  #: cost of free places, of what the gel touched nothing of, and of rays of sight.
 
     @property
     def typical(self) -> float:

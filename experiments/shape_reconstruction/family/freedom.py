@@ -228,15 +228,10 @@ _SAYS = {
 
 @dataclass(frozen=True)
 class Strain:
-    """What a shape asks of the bench.
+    """What a shape asks of the bench."""
 
-    Attributes:
-        cost: half the sum of squares, in standard deviations.
-        most: what is off by the most of them, in words.
-    """
-
-    cost: float
-    most: str
+    cost: float  #: half the sum of squares, in standard deviations.
+    most: str  #: what is off by the most of them, in words.
 
     @property
     def beyond_belief(self) -> bool:

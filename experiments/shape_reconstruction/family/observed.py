@@ -52,90 +52,57 @@ _WAY_STEP = 8.0e-3
 
 
 class SightRays(NamedTuple):
-    """Rays of one camera in ``stand``.
+    """Rays of one camera in ``stand``."""
 
-    Attributes:
-        eye: ``(3,)`` m.
-        directions: ``(n, 3)`` unit.
-        kinds: ``(n,)`` ``PASS``, ``GRAZE`` or ``MEET``.
-        worth: ``(n,)`` weight of each one's squared residual.
-        gain: ``(n,)`` by which a distance counts for more than it is: a thin part far outside of the mask is
-            as wrong as a thick one.
-        pixel: m per pixel at the object, a first guess of it.
-        right, down: ``(3,)`` unit, axes of the picture.
-        middle: ``(3,)`` unit, towards the middle of the mask.
-        position_sigma: m at the object, by which the camera's errors shift the picture.
-        scale_sigma: relative error of the picture's scale.
-        step: m between places on a ray where a shape is looked for.
-    """
-
-    eye: FloatArray
-    directions: FloatArray
-    kinds: IntArray
-    worth: FloatArray
+    eye: FloatArray  #: ``(3,)`` m.
+    directions: FloatArray  #: ``(n, 3)`` unit.
+    kinds: IntArray  #: ``(n,)`` ``PASS``, ``GRAZE`` or ``MEET``.
+    worth: FloatArray  #: ``(n,)`` weight of each one's squared residual.
     gain: FloatArray
-    pixel: float
-    right: FloatArray
-    down: FloatArray
-    middle: FloatArray
-    position_sigma: float
-    scale_sigma: float
-    step: float
+    """``(n,)`` by which a distance counts for more than it is: a thin part far outside of the mask is as
+    wrong as a thick one."""
+    pixel: float  #: m per pixel at the object, a first guess of it.
+    right: FloatArray  #: ``(3,)`` unit, axes of the picture.
+    down: FloatArray  #: ``(3,)`` unit, axes of the picture.
+    middle: FloatArray  #: ``(3,)`` unit, towards the middle of the mask.
+    position_sigma: float  #: m at the object, by which the camera's errors shift the picture.
+    scale_sigma: float  #: relative error of the picture's scale.
+    step: float  #: m between places on a ray where a shape is looked for.
 
 
 class FamilyEvidence(NamedTuple):
-    """What the compiled residuals read.
+    """What the compiled residuals read."""
 
-    Attributes:
-        points: ``(n, 3)`` m of the surface.
-        touch: ``(n,)`` which contact each is of.
-        sigma: ``(contacts,)`` m of each contact's points.
-        worth: ``(contacts,)`` weight of each point's squared residual.
-        middles: ``(contacts, 3)`` m, where the normals are taken.
-        normals: ``(contacts, 3)`` unit, outward.
-        normal_sigma: ``(contacts,)``.
-        gel: ``(contacts, 3, 3)`` rotations, stand from gel.
-        clear: ``(c, 3)`` m on the gel's face, beside what contacts touched: the object is not there.
-        clear_touch: ``(c,)`` which contact each is of.
-        clear_worth: ``(contacts,)`` weight of each such place's squared residual.
-        faces: ``(h, 3, 3)`` m, of each housing that met the object with nothing in the gel: the middle of its
-            face, and from there half of either side.
-        face_gel: ``(h, 3, 3)`` rotations, stand from gel.
-        face_sigma: ``(h,)`` m.
-        free: ``(k, 3)`` m where the sensor was, so that the object is not.
-        place: ``(2,)`` reciprocal of m: of x and y.
-        support: m, one standard deviation of its height.
-        largest: m, no side is longer.
-        rays: of the picture; none without one.
-        supposed: ``(s, 3)`` m where the surface is supposed to be.
-        supposed_worth: weight of each such place's squared residual.
-        supposed_right, supposed_down: ``(3,)`` m along the support that those are off by for each m that the
-            camera is off to the picture's right, and down.
-    """
-
-    points: FloatArray
-    touch: IntArray
-    sigma: FloatArray
-    worth: FloatArray
-    middles: FloatArray
-    normals: FloatArray
-    normal_sigma: FloatArray
-    gel: FloatArray
+    points: FloatArray  #: ``(n, 3)`` m of the surface.
+    touch: IntArray  #: ``(n,)`` which contact each is of.
+    sigma: FloatArray  #: ``(contacts,)`` m of each contact's points.
+    worth: FloatArray  #: ``(contacts,)`` weight of each point's squared residual.
+    middles: FloatArray  #: ``(contacts, 3)`` m, where the normals are taken.
+    normals: FloatArray  #: ``(contacts, 3)`` unit, outward.
+    normal_sigma: FloatArray  #: ``(contacts,)``.
+    gel: FloatArray  #: ``(contacts, 3, 3)`` rotations, stand from gel.
     clear: FloatArray
-    clear_touch: IntArray
-    clear_worth: FloatArray
+    """``(c, 3)`` m on the gel's face, beside what contacts touched: the object is not there."""
+    clear_touch: IntArray  #: ``(c,)`` which contact each is of.
+    clear_worth: FloatArray  #: ``(contacts,)`` weight of each such place's squared residual.
     faces: FloatArray
-    face_gel: FloatArray
-    face_sigma: FloatArray
-    free: FloatArray
-    place: float
-    support: float
-    largest: float
-    rays: SightRays
-    supposed: FloatArray
-    supposed_worth: float
+    """``(h, 3, 3)`` m, of each housing that met the object with nothing in the gel: the middle of its face,
+    and from there half of either side."""
+    face_gel: FloatArray  #: ``(h, 3, 3)`` rotations, stand from gel.
+    face_sigma: FloatArray  #: ``(h,)`` m.
+    free: FloatArray  #: ``(k, 3)`` m where the sensor was, so that the object is not.
+    place: float  #: ``(2,)`` reciprocal of m: of x and y.
+    support: float  #: m, one standard deviation of its height.
+    largest: float  #: m, no side is longer.
+    rays: SightRays  #: of the picture; none without one.
+    supposed: FloatArray  #: ``(s, 3)`` m where the surface is supposed to be.
+    supposed_worth: float  #: weight of each such place's squared residual.
     supposed_right: FloatArray
+    """``(3,)`` m along the support that those are off by for each m that the camera is off to the picture's
+    right, and down."""
     supposed_down: FloatArray
+    """``(3,)`` m along the support that those are off by for each m that the camera is off to the picture's
+    right, and down."""
 
 
 def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:

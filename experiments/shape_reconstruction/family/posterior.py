@@ -22,17 +22,11 @@ _LONGEST = 2.5
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """What the readings leave.
+    """What the readings leave."""
 
-    Attributes:
-        hypotheses: by weight, the greatest first.
-        weights: ``(n,)``, their sum 1.
-        about: ``SAMPLES`` shapes drawn about each, in their order.
-    """
-
-    hypotheses: tuple[Hypothesis, ...]
-    weights: FloatArray
-    about: tuple[tuple[FamilyShape, ...], ...]
+    hypotheses: tuple[Hypothesis, ...]  #: by weight, the greatest first.
+    weights: FloatArray  #: ``(n,)``, their sum 1.
+    about: tuple[tuple[FamilyShape, ...], ...]  #: ``SAMPLES`` shapes drawn about each, in their order.
 
     @property
     def best(self) -> Hypothesis:

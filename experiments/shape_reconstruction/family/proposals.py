@@ -46,27 +46,17 @@ _MOST_SCALE = 1.6
 
 @dataclass(frozen=True, eq=False)
 class Guides:
-    """Proposals that the readings make.
+    """Proposals that the readings make."""
 
-    Attributes:
-        places: ``(contacts, 3)`` m, of the contacts.
-        middles: ``(n, 2)`` m, where the object's middle may be, by its contacts.
-        extents: ``(3,)`` m, of the box around the contacts and the support; zero without contacts.
-        turns: ``(m,)`` rad, ways that its long side or a flat side may look.
-        seen: ``(2,)`` m across and up the picture at a metre's distance, of the silhouette; zero without one.
-        eye: ``(3,)`` m, of the camera.
-        middle_ray: ``(3,)`` unit, towards the middle of the silhouette's box.
-        outline: ``(k, 3)`` unit, towards the silhouette's border; none without one.
-    """
-
-    places: FloatArray
-    middles: FloatArray
-    extents: FloatArray
-    turns: FloatArray
+    places: FloatArray  #: ``(contacts, 3)`` m, of the contacts.
+    middles: FloatArray  #: ``(n, 2)`` m, where the object's middle may be, by its contacts.
+    extents: FloatArray  #: ``(3,)`` m, of the box around the contacts and the support; zero without contacts.
+    turns: FloatArray  #: ``(m,)`` rad, ways that its long side or a flat side may look.
     seen: FloatArray
-    eye: FloatArray
-    middle_ray: FloatArray
-    outline: FloatArray
+    """``(2,)`` m across and up the picture at a metre's distance, of the silhouette; zero without one."""
+    eye: FloatArray  #: ``(3,)`` m, of the camera.
+    middle_ray: FloatArray  #: ``(3,)`` unit, towards the middle of the silhouette's box.
+    outline: FloatArray  #: ``(k, 3)`` unit, towards the silhouette's border; none without one.
 
     @property
     def sighted(self) -> bool:

@@ -55,21 +55,15 @@ _BEND = 3.0
 
 
 class Rows(NamedTuple):
-    """Residuals in units of their standard deviations, and what they cost.
+    """Residuals in units of their standard deviations, and what they cost."""
 
-    Attributes:
-        values: ``(rows,)``.
-        weights: ``(rows,)`` by which a squared residual counts at this shape: worth times robustness.
-        along: ``(rays,)`` m along each ray where the shape is nearest.
-        held: ``(rays, 3)`` where each is held as derivatives are taken: two places, m, the second's share.
-        met: ``(faces, 3)`` m, the place of each housing's face that is nearest to the shape.
-    """
-
-    values: FloatArray
+    values: FloatArray  #: ``(rows,)``.
     weights: FloatArray
-    along: FloatArray
+    """``(rows,)`` by which a squared residual counts at this shape: worth times robustness."""
+    along: FloatArray  #: ``(rays,)`` m along each ray where the shape is nearest.
     held: FloatArray
-    met: FloatArray
+    """``(rays, 3)`` where each is held as derivatives are taken: two places, m, the second's share."""
+    met: FloatArray  #: ``(faces, 3)`` m, the place of each housing's face that is nearest to the shape.
 
 
 @compiled

@@ -68,34 +68,23 @@ ALIKE = 1.5e-3
 
 
 class PriorRows(NamedTuple):
-    """A normal density about a vector.
+    """A normal density about a vector."""
 
-    Attributes:
-        middle: ``(SIZE,)``.
-        rows: ``(k, SIZE)``: ``rows @ (theta - middle)`` are independent, of unit deviation.
-    """
-
-    middle: FloatArray
-    rows: FloatArray
+    middle: FloatArray  #: ``(SIZE,)``.
+    rows: FloatArray  #: ``(k, SIZE)``: ``rows @ (theta - middle)`` are independent, of unit deviation.
 
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A shape that the readings may be of.
+    """A shape that the readings may be of."""
 
-    Attributes:
-        shape: in the frame ``stand``.
-        prior: that its numbers are refined under.
-        cost: half the sum of squares of readings and prior, and the price of parts and sizes that are rare.
-        curvature: ``(n, n)`` of the cost along its free numbers; empty until it is refined for the last time.
-        price: of its parts and its size.
-    """
-
-    shape: FamilyShape
-    prior: PriorRows
+    shape: FamilyShape  #: in the frame ``stand``.
+    prior: PriorRows  #: that its numbers are refined under.
     cost: float
+    """half the sum of squares of readings and prior, and the price of parts and sizes that are rare."""
     curvature: FloatArray
-    price: float = 0.0
+    """``(n, n)`` of the cost along its free numbers; empty until it is refined for the last time."""
+    price: float = 0.0  #: of its parts and its size.
 
     @property
     def misfit(self) -> float:
@@ -104,21 +93,14 @@ class Hypothesis:
 
 
 class FamilySearch:
-    """One search through the family.
-
-    Attributes:
-        settings: how much is searched.
-        guides: what the readings propose.
-        coarse: a part of the readings, for ranking.
-        full: all of them.
-    """
+    """One search through the family."""
 
     def __init__(self, evidence: ShapeEvidence, settings: FamilySettings) -> None:
         """Read the evidence into arrays."""
-        self.settings = settings
-        self.guides: Guides = guides_of(evidence)
-        self.coarse: FamilyEvidence = observe(evidence, coarse=True)
-        self.full: FamilyEvidence = observe(evidence)
+        self.settings = settings  #: how much is searched.
+        self.guides: Guides = guides_of(evidence)  #: what the readings propose.
+        self.coarse: FamilyEvidence = observe(evidence, coarse=True)  #: a part of the readings, for ranking.
+        self.full: FamilyEvidence = observe(evidence)  #: all of them.
         self._place_error = evidence.place_error
         rays = self.full.rays
         self._bench = bench_rows(

@@ -5,35 +5,21 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class FamilySettings:
-    """Work and scales of a fit.
-
-    Attributes:
-        draws: shapes drawn from the prior, spread evenly over classes and their combinations of parts.
-        yaws: turns that each draw is tried at.
-        starts: of them that are fitted to all readings, for a few rounds.
-        refined: of those, how many go on.
-        refining: rounds of each.
-        changed: hypotheses of which parts are then put on, taken off or exchanged.
-        hops: rounds of looking beside the best of them for better.
-        hopping: rounds that each shape beside one is refined for.
-        finals: hypotheses that are refined to the end.
-        finishing: rounds of each of those.
-        pitch: m, of the grid that the surface is taken from.
-        seed: of the draws.
-    """
+    """Work and scales of a fit."""
 
     draws: int = 1850
-    yaws: int = 4
-    starts: int = 84
-    refined: int = 42
-    refining: int = 14
-    changed: int = 4
-    hops: int = 4
-    hopping: int = 7
-    finals: int = 10
-    finishing: int = 14
-    pitch: float = 2.5e-3
-    seed: int = 0
+    """shapes drawn from the prior, spread evenly over classes and their combinations of parts."""
+    yaws: int = 4  #: turns that each draw is tried at.
+    starts: int = 84  #: of them that are fitted to all readings, for a few rounds.
+    refined: int = 42  #: of those, how many go on.
+    refining: int = 14  #: rounds of each.
+    changed: int = 4  #: hypotheses of which parts are then put on, taken off or exchanged.
+    hops: int = 4  #: rounds of looking beside the best of them for better.
+    hopping: int = 7  #: rounds that each shape beside one is refined for.
+    finals: int = 10  #: hypotheses that are refined to the end.
+    finishing: int = 14  #: rounds of each of those.
+    pitch: float = 2.5e-3  #: m, of the grid that the surface is taken from.
+    seed: int = 0  #: of the draws.
 
 
 LEVELS = {

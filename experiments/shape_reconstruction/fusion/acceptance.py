@@ -39,19 +39,14 @@ FOLDS = 8
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An estimate and how well it predicts readings that it was not fitted to.
+    """An estimate and how well it predicts readings that it was not fitted to."""
 
-    Attributes:
-        estimate: the surface.
-        left_out: ``(contacts,)`` rms distance of each contact from the surface fitted without it, m.
-        outline_error: share of the silhouette that the surface misses or adds; zero without a picture.
-        open_axes: axes that no reading limits, the family not counted as one.
-    """
-
-    estimate: ShapeEstimate
+    estimate: ShapeEstimate  #: the surface.
     left_out: FloatArray
+    """``(contacts,)`` rms distance of each contact from the surface fitted without it, m."""
     outline_error: float = 0.0
-    open_axes: tuple[str, ...] = ()
+    """share of the silhouette that the surface misses or adds; zero without a picture."""
+    open_axes: tuple[str, ...] = ()  #: axes that no reading limits, the family not counted as one.
 
     @property
     def misfit(self) -> float:

@@ -40,21 +40,13 @@ _SILHOUETTE = 1.0e-3
 
 @dataclass(frozen=True, eq=False)
 class _Data:
-    """Observations of the field by contacts.
+    """Observations of the field by contacts."""
 
-    Attributes:
-        points: ``(n, 3)`` m.
-        residuals: ``(n,)`` signed distance that a contact states less that of the prior, m.
-        sigmas: ``(n,)`` one standard deviation of each, m.
-        touches: ``(n,)`` the contact that each is of.
-        on_surface: ``(n,)`` whether it is a place that was touched.
-    """
-
-    points: FloatArray
-    residuals: FloatArray
-    sigmas: FloatArray
-    touches: IntArray
-    on_surface: IntArray
+    points: FloatArray  #: ``(n, 3)`` m.
+    residuals: FloatArray  #: ``(n,)`` signed distance that a contact states less that of the prior, m.
+    sigmas: FloatArray  #: ``(n,)`` one standard deviation of each, m.
+    touches: IntArray  #: ``(n,)`` the contact that each is of.
+    on_surface: IntArray  #: ``(n,)`` whether it is a place that was touched.
 
 
 def bend_prior(evidence: ShapeEvidence) -> Candidate:

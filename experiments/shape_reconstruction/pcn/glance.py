@@ -27,15 +27,10 @@ _RIM[1:-1, 1:-1] = False
 
 @dataclass(frozen=True, eq=False)
 class Glance:
-    """A trained network.
+    """A trained network."""
 
-    Attributes:
-        network: that runs it.
-        card: where it comes from and what it reaches on shapes held out.
-    """
-
-    network: Network
-    card: Mapping[str, object]
+    network: Network  #: that runs it.
+    card: Mapping[str, object]  #: where it comes from and what it reaches on shapes held out.
 
     @property
     def held_out(self) -> float:

@@ -18,15 +18,11 @@ _LEAST_REACH = 1.0e-3
 
 @dataclass(frozen=True, eq=False)
 class PointFrame:
-    """From metres to the network's numbers.
-
-    Attributes:
-        middle: ``(3,)`` m in ``stand``: between the least and the greatest x and y touched; z of the support.
-        reach: m: the longest side of the box of all touches and the support.
-    """
+    """From metres to the network's numbers."""
 
     middle: FloatArray
-    reach: float
+    """``(3,)`` m in ``stand``: between the least and the greatest x and y touched; z of the support."""
+    reach: float  #: m: the longest side of the box of all touches and the support.
 
     @classmethod
     def of(cls, points: FloatArray) -> "PointFrame":

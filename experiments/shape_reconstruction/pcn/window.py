@@ -25,13 +25,9 @@ UNTOUCHED = PointFrame(np.zeros(3), 0.2)
 
 @dataclass(frozen=True)
 class Turned:
-    """A turn about the vertical through the origin of ``stand``.
+    """A turn about the vertical through the origin of ``stand``."""
 
-    Attributes:
-        angle: rad, from ``stand``'s x axis to the camera.
-    """
-
-    angle: float
+    angle: float  #: rad, from ``stand``'s x axis to the camera.
 
     @classmethod
     def towards(cls, look: SeenMask | None) -> "Turned":

@@ -26,15 +26,10 @@ SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".3mf", ".msh")
 
 @dataclass(frozen=True, eq=False)
 class LibraryShape:
-    """A mesh of no size: one long, upright, the middle of its box above the origin, its foot on z = 0.
+    """A mesh of no size: one long, upright, the middle of its box above the origin, its foot on z = 0."""
 
-    Attributes:
-        name: of the file or the folder that it is of.
-        mesh: watertight.
-    """
-
-    name: str
-    mesh: Mesh
+    name: str  #: of the file or the folder that it is of.
+    mesh: Mesh  #: watertight.
 
     @cached_property
     def samples(self) -> tuple[cKDTree, FloatArray, FloatArray]:

@@ -41,21 +41,14 @@ _LEAST, _MOST = 0.02, 1.0
 
 @dataclass(frozen=True, eq=False)
 class PlacedShape:
-    """A shape in ``stand``.
+    """A shape in ``stand``."""
 
-    Attributes:
-        shape: of the library.
-        size: m, its longest side.
-        yaw: rad about z.
-        place: ``(2,)`` m.
-        cost: the less the better: of contacts, normals, free space, silhouette and area; may be below 0.
-    """
-
-    shape: LibraryShape
-    size: float
-    yaw: float
-    place: FloatArray
+    shape: LibraryShape  #: of the library.
+    size: float  #: m, its longest side.
+    yaw: float  #: rad about z.
+    place: FloatArray  #: ``(2,)`` m.
     cost: float
+    """the less the better: of contacts, normals, free space, silhouette and area; may be below 0."""
 
     @property
     def mesh(self) -> Mesh:

@@ -44,22 +44,15 @@ _ANYWHERE = 1.0
 
 @dataclass(frozen=True, eq=False)
 class AuthoredAudio:
-    """A network and its worth.
+    """A network and its worth."""
 
-    Attributes:
-        graph: of the network.
-        split: of the nodes.
-        errors: of each way to the shapes at held-out nodes, ``"network"``, ``"nearest_trained"``,
-            ``"linear"``, and ``"table_float16"`` at the nodes themselves: by a name with its unit.
-        settings: how it was made.
-        seconds: s of ``"train"`` and ``"measure"`` (``stage_seconds.timed``).
-    """
-
-    graph: ModelProto
-    split: Split
+    graph: ModelProto  #: of the network.
+    split: Split  #: of the nodes.
     errors: Mapping[str, Mapping[str, float]]
-    settings: Mapping[str, str | float | int | bool | None]
-    seconds: Mapping[str, float]
+    """of each way to the shapes at held-out nodes, ``"network"``, ``"nearest_trained"``, ``"linear"``, and
+    ``"table_float16"`` at the nodes themselves: by a name with its unit."""
+    settings: Mapping[str, str | float | int | bool | None]  #: how it was made.
+    seconds: Mapping[str, float]  #: s of ``"train"`` and ``"measure"`` (``stage_seconds.timed``).
 
 
 def author_audio(

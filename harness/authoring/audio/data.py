@@ -24,28 +24,18 @@ _QUADRATIC_PARTS = 4
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """Nodes that are learned from, and nodes that are never shown.
+    """Nodes that are learned from, and nodes that are never shown."""
 
-    Attributes:
-        trained: ascending.
-        held_out: ascending.
-    """
-
-    trained: IntArray
-    held_out: IntArray
+    trained: IntArray  #: ascending.
+    held_out: IntArray  #: ascending.
 
 
 @dataclass(frozen=True, eq=False)
 class SoundSamples:
-    """Places on a surface and the shapes there.
+    """Places on a surface and the shapes there."""
 
-    Attributes:
-        points: ``(k, 3)`` m.
-        shapes: ``(k, m, 3)`` 1/sqrt(kg).
-    """
-
-    points: FloatArray
-    shapes: FloatArray
+    points: FloatArray  #: ``(k, 3)`` m.
+    shapes: FloatArray  #: ``(k, m, 3)`` 1/sqrt(kg).
 
 
 def split_nodes(count: int, share: float = 0.1, seed: int = 0) -> Split:

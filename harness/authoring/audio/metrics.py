@@ -37,20 +37,15 @@ _SILENT = -400.0
 
 @dataclass(frozen=True)
 class SoundDistances:
-    """How far one sound is from another.
-
-    Attributes:
-        stft: mean over frames and bins of the squared difference of the real parts and of the
-            imaginary parts, added.
-        envelope: root mean square difference of the envelopes, which are the magnitudes of the
-            analytic signals.
-        spectral_db: energy of the difference of the spectra over the reference's, which no scale
-            of both sounds changes.
-    """
+    """How far one sound is from another."""
 
     stft: float
+    """mean over frames and bins of the squared difference of the real parts and of the imaginary parts,
+    added."""
     envelope: float
+    """root mean square difference of the envelopes, which are the magnitudes of the analytic signals."""
     spectral_db: float
+    """energy of the difference of the spectra over the reference's, which no scale of both sounds changes."""
 
 
 def sound_distances(found: FloatArray, reference: FloatArray) -> SoundDistances:

@@ -42,37 +42,24 @@ _NEAR = 0.02
 
 @dataclass(frozen=True, eq=False)
 class AudioRequest(PartRequest):
-    """What is to be built, by a profile of ``audio_profiles.PROFILES``.
+    """What is to be built, by a profile of ``audio_profiles.PROFILES``."""
 
-    Attributes:
-        limit: Hz, modes up to there.
-        most: modes at most, the lowest.
-        edge: m, longest edge of an element; None for a share of the shortest wave.
-    """
-
-    limit: float = HEARING
-    most: int = MODES
-    edge: float | None = None
+    limit: float = HEARING  #: Hz, modes up to there.
+    most: int = MODES  #: modes at most, the lowest.
+    edge: float | None = None  #: m, longest edge of an element; None for a share of the shortest wave.
 
 
 @dataclass(frozen=True, eq=False)
 class BuiltAudio:
-    """An ObjectFile and how it came about.
+    """An ObjectFile and how it came about."""
 
-    Attributes:
-        object: on disk.
-        modes: canonical.
-        audio: its network and errors.
-        said: what was done to the mesh and what to look at.
-        seconds: s of each of ``STAGES`` (``stage_seconds.timed``). Where modes were kept from an earlier
-            solution, ``"mesh"``, ``"assemble"`` and ``"solve"`` are what they took then.
-    """
-
-    object: ObjectFile
-    modes: Modes
-    audio: AuthoredAudio
-    said: tuple[str, ...]
+    object: ObjectFile  #: on disk.
+    modes: Modes  #: canonical.
+    audio: AuthoredAudio  #: its network and errors.
+    said: tuple[str, ...]  #: what was done to the mesh and what to look at.
     seconds: Mapping[str, float]
+    """s of each of ``STAGES`` (``stage_seconds.timed``). Where modes were kept from an earlier solution,
+    ``"mesh"``, ``"assemble"`` and ``"solve"`` are what they took then."""
 
 
 def build_audio(

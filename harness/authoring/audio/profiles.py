@@ -14,59 +14,35 @@ REACHES = (0.7, 1.0, 1.4)
 
 @dataclass(frozen=True)
 class WavesSpec:
-    """Plane waves and a linear layer, found without training.
+    """Plane waves and a linear layer, found without training."""
 
-    Attributes:
-        width: waves.
-        reaches: that are tried.
-        widest: waves at most, where those of ``width`` are too few; they are doubled up to there.
-        storage: of the linear layer in the file.
-    """
-
-    width: int
-    reaches: tuple[float, ...] = REACHES
-    widest: int = 0
-    storage: Storage = "float32"
+    width: int  #: waves.
+    reaches: tuple[float, ...] = REACHES  #: that are tried.
+    widest: int = 0  #: waves at most, where those of ``width`` are too few; they are doubled up to there.
+    storage: Storage = "float32"  #: of the linear layer in the file.
 
 
 @dataclass(frozen=True)
 class PerceptronSpec:
-    """Perceptrons trained by Adam; the defaults are the paper's.
+    """Perceptrons trained by Adam; the defaults are the paper's."""
 
-    Attributes:
-        branches: 3, one for each direction of force, or 1 for all.
-        depth: hidden layers.
-        width: of each.
-        octaves: of the encoding.
-        skip: the layer, counted from 0, that takes the encoded input too; 0 for none.
-        epochs: passes over the samples.
-        batch: samples in a step.
-        rate: of Adam's first steps; it falls to zero as half a cosine.
-    """
-
-    branches: int = 3
-    depth: int = 8
-    width: int = 256
-    octaves: int = 10
-    skip: int = 5
-    epochs: int = 60
-    batch: int = 256
-    rate: float = 1e-3
+    branches: int = 3  #: 3, one for each direction of force, or 1 for all.
+    depth: int = 8  #: hidden layers.
+    width: int = 256  #: of each.
+    octaves: int = 10  #: of the encoding.
+    skip: int = 5  #: the layer, counted from 0, that takes the encoded input too; 0 for none.
+    epochs: int = 60  #: passes over the samples.
+    batch: int = 256  #: samples in a step.
+    rate: float = 1e-3  #: of Adam's first steps; it falls to zero as half a cosine.
 
 
 @dataclass(frozen=True)
 class AudioProfile:
-    """One trade of time for accuracy.
+    """One trade of time for accuracy."""
 
-    Attributes:
-        network: that is made.
-        sounds: held-out nodes whose sounds are compared.
-        table: whether the exact shapes are written beside the network.
-    """
-
-    network: WavesSpec | PerceptronSpec
-    sounds: int
-    table: bool = True
+    network: WavesSpec | PerceptronSpec  #: that is made.
+    sounds: int  #: held-out nodes whose sounds are compared.
+    table: bool = True  #: whether the exact shapes are written beside the network.
 
 
 _SMALL = PerceptronSpec(branches=1, depth=4, width=256, octaves=6, skip=0, epochs=300)

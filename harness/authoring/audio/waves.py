@@ -47,21 +47,13 @@ Features = Callable[[FloatArray], AnyArray]
 
 @dataclass(frozen=True, eq=False)
 class Waves:
-    """``[sin(p v + phase), p, 1] @ weights`` at ``p = (point - shift) * factor``.
+    """``[sin(p v + phase), p, 1] @ weights`` at ``p = (point - shift) * factor``."""
 
-    Attributes:
-        shift: ``(3,)`` m.
-        factor: 1/m.
-        vectors: ``(3, d)``.
-        phases: ``(d,)`` rad.
-        weights: ``(d + 4, 3 m)`` 1/sqrt(kg); number ``3 i + axis`` belongs to mode ``i``.
-    """
-
-    shift: FloatArray
-    factor: float
-    vectors: FloatArray
-    phases: FloatArray
-    weights: FloatArray
+    shift: FloatArray  #: ``(3,)`` m.
+    factor: float  #: 1/m.
+    vectors: FloatArray  #: ``(3, d)``.
+    phases: FloatArray  #: ``(d,)`` rad.
+    weights: FloatArray  #: ``(d + 4, 3 m)`` 1/sqrt(kg); number ``3 i + axis`` belongs to mode ``i``.
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """``(k, m, 3)``: the sum in double precision, to compare a graph with."""
@@ -77,33 +69,22 @@ class Waves:
 
 @dataclass(frozen=True, eq=False)
 class Readout:
-    """A linear layer and how well it is expected to do.
+    """A linear layer and how well it is expected to do."""
 
-    Attributes:
-        weights: ``(features, outputs)``.
-        expected: mean relative error of a sample that was left out, in single precision, with weights as
-            the file holds them.
-        ridge: that was chosen, of the largest eigenvalue.
-    """
-
-    weights: FloatArray
+    weights: FloatArray  #: ``(features, outputs)``.
     expected: float
-    ridge: float
+    """mean relative error of a sample that was left out, in single precision, with weights as the file holds
+    them."""
+    ridge: float  #: that was chosen, of the largest eigenvalue.
 
 
 @dataclass(frozen=True, eq=False)
 class FittedWaves:
-    """A network and how it was chosen.
+    """A network and how it was chosen."""
 
-    Attributes:
-        network: the best of the reaches tried.
-        reach: of its waves' vectors.
-        readout: of its linear layer.
-    """
-
-    network: Waves
-    reach: float
-    readout: Readout
+    network: Waves  #: the best of the reaches tried.
+    reach: float  #: of its waves' vectors.
+    readout: Readout  #: of its linear layer.
 
 
 def fit_waves(

@@ -33,19 +33,13 @@ RETRIED: frozenset[Outcome] = frozenset({"crashed", "out of memory"})
 
 @dataclass(frozen=True, eq=False)
 class BuildPlan:
-    """What a build will do.
+    """What a build will do."""
 
-    Attributes:
-        items: of the catalogue, in its order.
-        standing: names that are built as wanted.
-        known: records of objects that failed with the same key, and are not tried again.
-        waiting: items that are to be built.
-    """
-
-    items: tuple[BuildItem, ...]
-    standing: frozenset[str]
+    items: tuple[BuildItem, ...]  #: of the catalogue, in its order.
+    standing: frozenset[str]  #: names that are built as wanted.
     known: Mapping[str, ObjectRecord]
-    waiting: tuple[BuildItem, ...]
+    """records of objects that failed with the same key, and are not tried again."""
+    waiting: tuple[BuildItem, ...]  #: items that are to be built.
 
 
 def build_plan(

@@ -36,35 +36,21 @@ _UNIT_OF_LABEL = 3.0
 
 @dataclass(frozen=True)
 class IntakeFinding:
-    """One object's intake.
+    """One object's intake."""
 
-    Attributes:
-        name: of the object.
-        material: of it.
-        mesh: its file or ``builtin:`` name.
-        reason: why it is excluded; None where it can be built.
-        remarks: what to look at, a sentence each.
-        units: that the file's numbers were taken in.
-        longest_side: m.
-        label: m, the catalogue's; None where it has none.
-        watertight: whether the file's surface is closed.
-        faces: of the surface.
-        wall: m, that all but 2 % of the surface exceeds; None where the surface is open.
-        mass: kg, implied by volume and density; None where neither volume nor wall is known.
-    """
-
-    name: str
-    material: str
-    mesh: str
-    reason: str | None = None
-    remarks: tuple[str, ...] = ()
-    units: str | None = None
-    longest_side: float | None = None
-    label: float | None = None
-    watertight: bool | None = None
-    faces: int | None = None
-    wall: float | None = None
+    name: str  #: of the object.
+    material: str  #: of it.
+    mesh: str  #: its file or ``builtin:`` name.
+    reason: str | None = None  #: why it is excluded; None where it can be built.
+    remarks: tuple[str, ...] = ()  #: what to look at, a sentence each.
+    units: str | None = None  #: that the file's numbers were taken in.
+    longest_side: float | None = None  #: m.
+    label: float | None = None  #: m, the catalogue's; None where it has none.
+    watertight: bool | None = None  #: whether the file's surface is closed.
+    faces: int | None = None  #: of the surface.
+    wall: float | None = None  #: m, that all but 2 % of the surface exceeds; None where the surface is open.
     mass: float | None = None
+    """kg, implied by volume and density; None where neither volume nor wall is known."""
 
 
 def units_of(row: CatalogueRow, mesh: str) -> str | None:

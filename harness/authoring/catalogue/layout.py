@@ -27,15 +27,11 @@ PASSING: frozenset[Outcome] = frozenset({"disk full", "worker lost"})
 
 @dataclass(frozen=True)
 class BuildFolder:
-    """The folder of a build.
+    """The folder of a build."""
 
-    Attributes:
-        folder: that all workers see under the same path.
-        shared_stages: folder of stages that several builds share; None for one of this build's own.
-    """
-
-    folder: Path
+    folder: Path  #: that all workers see under the same path.
     shared_stages: Path | None = None
+    """folder of stages that several builds share; None for one of this build's own."""
 
     @property
     def stages(self) -> Path:
@@ -97,19 +93,12 @@ class ExcludedEntry(StrictModel):
 
 
 class BuildSettings(StrictModel):
-    """The last build of a folder.
+    """The last build of a folder."""
 
-    Attributes:
-        schema_version: of this file.
-        catalogue: path of its file.
-        names: of the objects, in the catalogue's order.
-        excluded: rows that were not built.
-    """
-
-    schema_version: Literal[1] = Field(default=1, alias="schema")
-    catalogue: str
-    names: tuple[str, ...]
-    excluded: tuple[ExcludedEntry, ...] = ()
+    schema_version: Literal[1] = Field(default=1, alias="schema")  #: of this file.
+    catalogue: str  #: path of its file.
+    names: tuple[str, ...]  #: of the objects, in the catalogue's order.
+    excluded: tuple[ExcludedEntry, ...] = ()  #: rows that were not built.
 
 
 def write_settings(
@@ -132,53 +121,32 @@ def read_settings(of: BuildFolder) -> BuildSettings:
 
 
 class SenseRecord(StrictModel):
-    """One sense of an object.
+    """One sense of an object."""
 
-    Attributes:
-        key: of its stage.
-        made: whether this build computed it; false where it stood.
-        seconds: on the clock, of each part of the work when it was computed.
-        clock: what else was measured with a clock, by its name in ``object.json``.
-        remarks: what was done to the mesh and what to look at.
-    """
-
-    key: str
-    made: bool
+    key: str  #: of its stage.
+    made: bool  #: whether this build computed it; false where it stood.
     seconds: dict[str, float] = Field(default_factory=dict)
+    """on the clock, of each part of the work when it was computed."""
     clock: dict[str, float] = Field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
+    """what else was measured with a clock, by its name in ``object.json``."""
+    remarks: tuple[str, ...] = ()  #: what was done to the mesh and what to look at.
 
 
 class ObjectRecord(StrictModel):
-    """One object.
+    """One object."""
 
-    Attributes:
-        schema_version: of this file.
-        name: of the object.
-        key: of all that it depends on.
-        outcome: what became of it.
-        reason: where it was not built.
-        seconds: s on the clock of the last attempt.
-        attempts: that it took.
-        host: that built it.
-        senses: by name.
-        object_json_bytes: size of the description; 0 where it was not built.
-        object_json_sha256: hash of the description; "" where it was not built.
-        files: that the description names.
-    """
-
-    schema_version: Literal[1] = Field(default=1, alias="schema")
-    name: str
-    key: str
-    outcome: Outcome
-    reason: str = ""
-    seconds: float = 0.0
-    attempts: int = 1
-    host: str = ""
-    senses: dict[Modality, SenseRecord] = Field(default_factory=dict)
-    object_json_bytes: int = 0
-    object_json_sha256: str = ""
-    files: tuple[FileEntry, ...] = ()
+    schema_version: Literal[1] = Field(default=1, alias="schema")  #: of this file.
+    name: str  #: of the object.
+    key: str  #: of all that it depends on.
+    outcome: Outcome  #: what became of it.
+    reason: str = ""  #: where it was not built.
+    seconds: float = 0.0  #: s on the clock of the last attempt.
+    attempts: int = 1  #: that it took.
+    host: str = ""  #: that built it.
+    senses: dict[Modality, SenseRecord] = Field(default_factory=dict)  #: by name.
+    object_json_bytes: int = 0  #: size of the description; 0 where it was not built.
+    object_json_sha256: str = ""  #: hash of the description; "" where it was not built.
+    files: tuple[FileEntry, ...] = ()  #: that the description names.
 
     @property
     def built(self) -> bool:

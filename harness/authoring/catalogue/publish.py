@@ -16,17 +16,11 @@ from harness.objects.builtin import DESCRIPTION
 
 @dataclass(frozen=True)
 class SentObject:
-    """What became of one object.
+    """What became of one object."""
 
-    Attributes:
-        name: of the object.
-        sent: bytes; 0 where all of it was there, or where it is not built.
-        outcome: ``"sent"``, ``"there"`` or ``"not built"``.
-    """
-
-    name: str
-    sent: int
-    outcome: str
+    name: str  #: of the object.
+    sent: int  #: bytes; 0 where all of it was there, or where it is not built.
+    outcome: str  #: ``"sent"``, ``"there"`` or ``"not built"``.
 
 
 class ObjectStore:

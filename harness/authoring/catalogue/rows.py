@@ -49,63 +49,38 @@ _OF_A_FOLDER = ("model", "textured", "nontextured")
 
 @dataclass(frozen=True)
 class CatalogueRow:
-    """One object as its catalogue describes it.
+    """One object as its catalogue describes it."""
 
-    Attributes:
-        name: of the object, and of its folder; unique in the catalogue.
-        material: one of the seven, in lower case.
-        number: in the catalogue, as published; "" where it has none.
-        scale: m, the label of the object's longest side; None where it has none.
-        mesh: a file, relative to the folder of meshes, or ``builtin:`` and a name; None to search for one.
-        units: of the file's numbers; None where the file or the label decides.
-        wall: m, of a hollow thing of which the file has the outside.
-        mass: kg, of the real object; None where nobody weighed it.
-        licence: of the mesh.
-        source: where the mesh comes from; None where the catalogue does not say.
-        up_axis: axis of the file that points up; None for the one that it declares, else z.
-    """
-
-    name: str
-    material: str
-    number: str = ""
-    scale: float | None = None
+    name: str  #: of the object, and of its folder; unique in the catalogue.
+    material: str  #: one of the seven, in lower case.
+    number: str = ""  #: in the catalogue, as published; "" where it has none.
+    scale: float | None = None  #: m, the label of the object's longest side; None where it has none.
     mesh: str | None = None
-    units: str | None = None
-    wall: float | None = None
-    mass: float | None = None
-    licence: str = "unknown"
-    source: str | None = None
-    up_axis: str | None = None
+    """a file, relative to the folder of meshes, or ``builtin:`` and a name; None to search for one."""
+    units: str | None = None  #: of the file's numbers; None where the file or the label decides.
+    wall: float | None = None  #: m, of a hollow thing of which the file has the outside.
+    mass: float | None = None  #: kg, of the real object; None where nobody weighed it.
+    licence: str = "unknown"  #: of the mesh.
+    source: str | None = None  #: where the mesh comes from; None where the catalogue does not say.
+    up_axis: str | None = None  #: axis of the file that points up; None for the one that it declares, else z.
 
 
 @dataclass(frozen=True)
 class ExcludedRow:
-    """A row that is not built.
+    """A row that is not built."""
 
-    Attributes:
-        name: of the object, or of the line where it has none.
-        reason: a sentence with the value, the limit, and what to do.
-    """
-
-    name: str
-    reason: str
+    name: str  #: of the object, or of the line where it has none.
+    reason: str  #: a sentence with the value, the limit, and what to do.
 
 
 @dataclass(frozen=True)
 class Catalogue:
-    """What a catalogue's file lists.
+    """What a catalogue's file lists."""
 
-    Attributes:
-        path: of the file.
-        rows: in their order.
-        excluded: rows that cannot be built.
-        notes: on the file as a whole, a sentence each.
-    """
-
-    path: Path
-    rows: tuple[CatalogueRow, ...]
-    excluded: tuple[ExcludedRow, ...]
-    notes: tuple[str, ...]
+    path: Path  #: of the file.
+    rows: tuple[CatalogueRow, ...]  #: in their order.
+    excluded: tuple[ExcludedRow, ...]  #: rows that cannot be built.
+    notes: tuple[str, ...]  #: on the file as a whole, a sentence each.
 
 
 class RowRefused(Exception):
@@ -321,33 +296,19 @@ def _cells(columns: Sequence[str], cells: Sequence[str], separator: str) -> dict
 
 
 class ObjectTable(StrictModel):
-    """One object.
+    """One object."""
 
-    Attributes:
-        name: of the object and of its folder.
-        material: one of the seven.
-        number: in the catalogue.
-        scale: the label of the object's longest side.
-        mesh: a file, relative to the folder of meshes, or ``builtin:`` and a name.
-        units: of the file's numbers: m, cm, mm or in.
-        wall: of a hollow thing of which the file has the outside.
-        mass: of the real object.
-        licence: of the mesh.
-        source: where the mesh comes from.
-        up_axis: axis of the file that points up: x, y or z.
-    """
-
-    name: str
-    material: str
-    number: str = ""
-    scale: Annotated[Length, Positive] | None = None
-    mesh: str | None = None
-    units: str | None = None
-    wall: Annotated[Length, Positive] | None = None
-    mass: Annotated[Annotated[float, MASS], Positive] | None = None
-    licence: str = "unknown"
-    source: str | None = None
-    up_axis: str | None = None
+    name: str  #: of the object and of its folder.
+    material: str  #: one of the seven.
+    number: str = ""  #: in the catalogue.
+    scale: Annotated[Length, Positive] | None = None  #: the label of the object's longest side.
+    mesh: str | None = None  #: a file, relative to the folder of meshes, or ``builtin:`` and a name.
+    units: str | None = None  #: of the file's numbers: m, cm, mm or in.
+    wall: Annotated[Length, Positive] | None = None  #: of a hollow thing of which the file has the outside.
+    mass: Annotated[Annotated[float, MASS], Positive] | None = None  #: of the real object.
+    licence: str = "unknown"  #: of the mesh.
+    source: str | None = None  #: where the mesh comes from.
+    up_axis: str | None = None  #: axis of the file that points up: x, y or z.
 
 
 class CatalogueFile(StrictModel):

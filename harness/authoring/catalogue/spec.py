@@ -37,25 +37,15 @@ _NAMES_A_PICTURE = re.compile(rb"^[ \t]*map_\w+[ \t]+(.+?)[ \t\r]*$", re.MULTILI
 
 @dataclass(frozen=True)
 class BuildSpec:
-    """What is built of every object.
+    """What is built of every object."""
 
-    Attributes:
-        senses: some of ``SENSES``.
-        profile: of every sense.
-        seed: of everything random.
-        limit: Hz, modes up to there.
-        most: modes at most, the lowest.
-        edge: m, longest edge of an element; None for a share of the shortest wave.
-        sensor: that presses.
-    """
-
-    senses: tuple[Modality, ...] = ("audio", "touch")
-    profile: str = "standard"
-    seed: int = 0
-    limit: float = HEARING
-    most: int = MODES
-    edge: float | None = None
-    sensor: TactileSensor = GELSIGHT_R15
+    senses: tuple[Modality, ...] = ("audio", "touch")  #: some of ``SENSES``.
+    profile: str = "standard"  #: of every sense.
+    seed: int = 0  #: of everything random.
+    limit: float = HEARING  #: Hz, modes up to there.
+    most: int = MODES  #: modes at most, the lowest.
+    edge: float | None = None  #: m, longest edge of an element; None for a share of the shortest wave.
+    sensor: TactileSensor = GELSIGHT_R15  #: that presses.
 
     def check(self) -> None:
         """Refuse what cannot be built.
@@ -73,19 +63,12 @@ class BuildSpec:
 
 @dataclass(frozen=True)
 class BuildItem:
-    """One object with its keys: all that the unit of work depends on.
+    """One object with its keys: all that the unit of work depends on."""
 
-    Attributes:
-        row: of the catalogue.
-        mesh: its file, or ``builtin:`` and a name.
-        key: of the whole object under a spec.
-        stages: the key of every sense.
-    """
-
-    row: CatalogueRow
-    mesh: str
-    key: str
-    stages: Mapping[Modality, str]
+    row: CatalogueRow  #: of the catalogue.
+    mesh: str  #: its file, or ``builtin:`` and a name.
+    key: str  #: of the whole object under a spec.
+    stages: Mapping[Modality, str]  #: the key of every sense.
 
 
 def build_item(row: CatalogueRow, mesh: str, spec: BuildSpec) -> BuildItem:

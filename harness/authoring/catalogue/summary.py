@@ -19,23 +19,16 @@ QUALITY: Mapping[str, tuple[str, str, float]] = MappingProxyType({
 
 @dataclass(frozen=True, eq=False)
 class ObjectSummary:
-    """One object of a build.
+    """One object of a build."""
 
-    Attributes:
-        name: of the object.
-        outcome: ``"built"``, ``"waiting"``, or why not.
-        reason: where it is not built.
-        record: of the last attempt; None where there was none.
-        object: an ObjectFile that stands, of this key or of an earlier one; None where there is none.
-        quality: by the keys of ``QUALITY``, those that there are, in the units of their headings.
-    """
-
-    name: str
-    outcome: str
-    reason: str
-    record: ObjectRecord | None
+    name: str  #: of the object.
+    outcome: str  #: ``"built"``, ``"waiting"``, or why not.
+    reason: str  #: where it is not built.
+    record: ObjectRecord | None  #: of the last attempt; None where there was none.
     object: ObjectFile | None
+    """an ObjectFile that stands, of this key or of an earlier one; None where there is none."""
     quality: Mapping[str, float] = field(default_factory=dict)
+    """by the keys of ``QUALITY``, those that there are, in the units of their headings."""
 
 
 def summaries(of: BuildFolder) -> list[ObjectSummary]:

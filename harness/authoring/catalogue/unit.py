@@ -123,15 +123,10 @@ def _space(error: OSError, path: Path) -> str:
 
 @dataclass(frozen=True, eq=False)
 class SenseStage:
-    """A sense that is on the disk.
+    """A sense that is on the disk."""
 
-    Attributes:
-        object: an ObjectFile with this sense alone.
-        record: how it came about; ``made`` where it was built just now.
-    """
-
-    object: ObjectFile
-    record: SenseRecord
+    object: ObjectFile  #: an ObjectFile with this sense alone.
+    record: SenseRecord  #: how it came about; ``made`` where it was built just now.
 
 
 def _composed(item: BuildItem, stages: Sequence[SenseStage]) -> Description:

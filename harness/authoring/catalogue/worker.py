@@ -26,30 +26,19 @@ from harness.basics.worker_pool import end_without_parent
 
 @dataclass(frozen=True)
 class WorkerLimits:
-    """What a worker may use.
+    """What a worker may use."""
 
-    Attributes:
-        seconds: on the clock, for one object; then its process is killed.
-        memory: bytes of data; None for what the machine has.
-    """
-
-    seconds: float
-    memory: int | None = None
+    seconds: float  #: on the clock, for one object; then its process is killed.
+    memory: int | None = None  #: bytes of data; None for what the machine has.
 
 
 @dataclass(frozen=True)
 class Job:
-    """One object to build.
+    """One object to build."""
 
-    Attributes:
-        item: the object.
-        spec: what is built of it.
-        folder: of the build.
-    """
-
-    item: BuildItem
-    spec: BuildSpec
-    folder: BuildFolder
+    item: BuildItem  #: the object.
+    spec: BuildSpec  #: what is built of it.
+    folder: BuildFolder  #: of the build.
 
 
 class ObjectWorker:
@@ -57,16 +46,12 @@ class ObjectWorker:
 
     Args:
         limits: of every job.
-
-    Attributes:
-        job: whose record was not taken yet; None while idle.
-        attempt: at that job, from 1.
     """
 
     def __init__(self, limits: WorkerLimits) -> None:
         self._limits = limits
-        self.job: Job | None = None
-        self.attempt = 0
+        self.job: Job | None = None  #: whose record was not taken yet; None while idle.
+        self.attempt = 0  #: at that job, from 1.
         self._begun = 0.0
         self._start()
 

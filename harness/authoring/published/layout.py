@@ -20,15 +20,10 @@ _UNUSED = "views_linears."
 
 @dataclass(frozen=True, eq=False)
 class FileTable:
-    """A table of the file.
+    """A table of the file."""
 
-    Attributes:
-        name: path of the table in the file, for messages.
-        values: entries by name.
-    """
-
-    name: str
-    values: Mapping[str, Any]
+    name: str  #: path of the table in the file, for messages.
+    values: Mapping[str, Any]  #: entries by name.
 
     def part(self, key: str) -> "FileTable":
         """Return a table within; ``DataRefused`` where there is none."""
@@ -146,17 +141,11 @@ def format_of(tree: Any, name: str) -> Format:
 
 @dataclass(eq=False)
 class State:
-    """The weights of a network by name; names that no layer reads are reported, not ignored.
+    """The weights of a network by name; names that no layer reads are reported, not ignored."""
 
-    Attributes:
-        name: path of the weights in the file, for messages.
-        values: arrays by name, without torch's prefix.
-        used: names that were read.
-    """
-
-    name: str
-    values: Mapping[str, Any]
-    used: set[str] = field(default_factory=set)
+    name: str  #: path of the weights in the file, for messages.
+    values: Mapping[str, Any]  #: arrays by name, without torch's prefix.
+    used: set[str] = field(default_factory=set)  #: names that were read.
 
     @classmethod
     def of(cls, part: FileTable, key: str) -> "State":

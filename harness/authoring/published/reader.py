@@ -196,14 +196,10 @@ class PickledDtype:
 
 
 class PickledArray:
-    """An array of plain numbers, made empty (``numpy.core.multiarray._reconstruct``) and filled by its state.
-
-    Attributes:
-        array: None before.
-    """
+    """An array of plain numbers, created empty (``numpy.core.multiarray._reconstruct``), then filled."""
 
     def __init__(self, *_: Any) -> None:
-        self.array: AnyArray | None = None
+        self.array: AnyArray | None = None  #: None before.
 
     def __setstate__(self, state: Any) -> None:
         if not (isinstance(state, tuple) and len(state) == 5 and isinstance(state[2], PickledDtype)):

@@ -34,19 +34,13 @@ _TESTED = 4
 
 @dataclass(eq=False)
 class ImportedParts:
-    """Parts gathered while a file is read.
+    """Parts gathered while a file is read."""
 
-    Attributes:
-        tree: tables of ``object.json``.
-        contents: bytes of files, by name.
-        dropped: numbers that the published programs never use, by name.
-        missing: sentences on what the file does not hold.
-    """
-
-    tree: dict[str, Any] = field(default_factory=dict)
-    contents: dict[str, bytes] = field(default_factory=dict)
+    tree: dict[str, Any] = field(default_factory=dict)  #: tables of ``object.json``.
+    contents: dict[str, bytes] = field(default_factory=dict)  #: bytes of files, by name.
     dropped: dict[str, int] = field(default_factory=dict)
-    missing: list[str] = field(default_factory=list)
+    """numbers that the published programs never use, by name."""
+    missing: list[str] = field(default_factory=list)  #: sentences on what the file does not hold.
 
     def network(
         self,

@@ -108,15 +108,10 @@ def smooth_normals(mesh: Mesh, points: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedMaps:
-    """What the reference simulator gives.
+    """What the reference simulator gives."""
 
-    Attributes:
-        maps: ``(n, rows, columns)`` m of indentation of the gel.
-        possible: ``(n,)``: no part of the object is where the sensor would be.
-    """
-
-    maps: FloatArray
-    possible: BoolArray
+    maps: FloatArray  #: ``(n, rows, columns)`` m of indentation of the gel.
+    possible: BoolArray  #: ``(n,)``: no part of the object is where the sensor would be.
 
 
 def reference_maps(

@@ -45,22 +45,15 @@ def psnr(found: AnyArray, reference: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class MapErrors:
-    """Maps of one kind of press against the reference.
+    """Maps of one kind of press against the reference."""
 
-    Attributes:
-        presses: that were possible.
-        asked: how many were drawn.
-        level: ``(n,)`` dB of the level that is measured.
-        nearest: ``(n,)`` dB of one reference map for each node: the nearest, upright, half as deep as may be,
-            with the yaw that was asked.
-        nothing: ``(n,)`` dB of an untouched gel.
-    """
-
-    presses: Presses
-    asked: int
-    level: FloatArray
+    presses: Presses  #: that were possible.
+    asked: int  #: how many were drawn.
+    level: FloatArray  #: ``(n,)`` dB of the level that is measured.
     nearest: FloatArray
-    nothing: FloatArray
+    """``(n,)`` dB of one reference map for each node: the nearest, upright, half as deep as may be, with the
+    yaw that was asked."""
+    nothing: FloatArray  #: ``(n,)`` dB of an untouched gel.
 
     def rows(self) -> dict[str, Mapping[str, float]]:
         """Median and 10th percentile of each, by name."""
@@ -76,23 +69,14 @@ class MapErrors:
 
 @dataclass(frozen=True, eq=False)
 class PressBench:
-    """What maps are measured on.
+    """What maps are measured on."""
 
-    Attributes:
-        mesh: of the object.
-        raster: of the same.
-        sensor: a flat gel.
-        skirt: of the gel.
-        nodes: the trained places.
-        most_off: m, of ``touch_nodes.signatures``: a press farther from all of them is left out.
-    """
-
-    mesh: Mesh
-    raster: RasterMesh
-    sensor: TactileSensor
-    skirt: GelSkirt
-    nodes: SurfaceNodes
-    most_off: float
+    mesh: Mesh  #: of the object.
+    raster: RasterMesh  #: of the same.
+    sensor: TactileSensor  #: a flat gel.
+    skirt: GelSkirt  #: of the gel.
+    nodes: SurfaceNodes  #: the trained places.
+    most_off: float  #: m, of ``touch_nodes.signatures``: a press farther from all of them is left out.
 
     def at_nodes(self, maps: Maps, count: int, seed: int) -> MapErrors:
         """Poses that were never shown, at trained places."""

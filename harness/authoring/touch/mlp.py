@@ -29,21 +29,13 @@ VERSION = 1
 
 @dataclass(frozen=True, eq=False)
 class LearnedMaps:
-    """Presses and their maps, to learn from.
+    """Presses and their maps, to learn from."""
 
-    Attributes:
-        presses: without yaw.
-        maps: ``(n, rows, columns)`` m, float32.
-        sensor: whose maps they are.
-        low: ``(3,)`` m, of the object's box.
-        high: ``(3,)`` m.
-    """
-
-    presses: Presses
-    maps: AnyArray
-    sensor: TactileSensor
-    low: FloatArray
-    high: FloatArray
+    presses: Presses  #: without yaw.
+    maps: AnyArray  #: ``(n, rows, columns)`` m, float32.
+    sensor: TactileSensor  #: whose maps they are.
+    low: FloatArray  #: ``(3,)`` m, of the object's box.
+    high: FloatArray  #: ``(3,)`` m.
 
 
 def learned_from(bench: PressBench, count: int, seed: int) -> LearnedMaps:

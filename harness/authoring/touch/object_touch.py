@@ -20,30 +20,19 @@ from harness.sim.solid.surface_source import surface_of
 
 @dataclass(frozen=True, eq=False)
 class TouchRequest(PartRequest):
-    """What is to be built, by a profile of ``touch_profiles.TOUCH_PROFILES``.
+    """What is to be built, by a profile of ``touch_profiles.TOUCH_PROFILES``."""
 
-    Attributes:
-        sensor: a flat gel.
-    """
-
-    sensor: TactileSensor = GELSIGHT_R15
+    sensor: TactileSensor = GELSIGHT_R15  #: a flat gel.
 
 
 @dataclass(frozen=True, eq=False)
 class BuiltTouch:
-    """An ObjectFile and how it came about.
+    """An ObjectFile and how it came about."""
 
-    Attributes:
-        object: on disk.
-        touch: its networks and errors.
-        said: what was done to the mesh and what to look at.
-        seconds: s on the clock of each stage.
-    """
-
-    object: ObjectFile
-    touch: AuthoredTouch
-    said: tuple[str, ...]
-    seconds: Mapping[str, float]
+    object: ObjectFile  #: on disk.
+    touch: AuthoredTouch  #: its networks and errors.
+    said: tuple[str, ...]  #: what was done to the mesh and what to look at.
+    seconds: Mapping[str, float]  #: s on the clock of each stage.
 
 
 def build_touch(wanted: TouchRequest, out: Path, report: Report, threads: int = 1) -> BuiltTouch:

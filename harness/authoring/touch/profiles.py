@@ -10,60 +10,36 @@ from harness.basics.files.named_file import nearest
 
 @dataclass(frozen=True)
 class CodesSpec:
-    """Codes of a surface.
-
-    Attributes:
-        most_bytes: of the codes alone, about a megabyte less than their file; nodes are as dense as it
-            allows.
-        pitch: m, of a patch's pixels.
-        width: numbers of a code on a linear basis; None for the heights themselves.
-    """
+    """Codes of a surface."""
 
     most_bytes: int = 18_000_000
-    pitch: float = 0.5e-3
-    width: int | None = None
+    """of the codes alone, about a megabyte less than their file; nodes are as dense as it allows."""
+    pitch: float = 0.5e-3  #: m, of a patch's pixels.
+    width: int | None = None  #: numbers of a code on a linear basis; None for the heights themselves.
 
 
 @dataclass(frozen=True)
 class TouchPerceptronSpec:
-    """A perceptron trained by Adam; the network is the paper's, its training our own.
+    """A perceptron trained by Adam; the network is the paper's, its training our own."""
 
-    Attributes:
-        depth: hidden layers.
-        width: of each.
-        octaves: of the encoding.
-        skip: the layer, counted from 0, that takes the encoded input too; 0 for none.
-        presses: whose maps are learned from.
-        epochs: checkpoints on the way.
-        steps: of Adam in an epoch.
-        batch: pixels in a step.
-        rate: of Adam's first steps; it falls to zero as half a cosine.
-    """
-
-    depth: int = 8
-    width: int = 256
-    octaves: int = 10
-    skip: int = 5
-    presses: int = 4000
-    epochs: int = 100
-    steps: int = 500
-    batch: int = 4096
-    rate: float = 5e-4
+    depth: int = 8  #: hidden layers.
+    width: int = 256  #: of each.
+    octaves: int = 10  #: of the encoding.
+    skip: int = 5  #: the layer, counted from 0, that takes the encoded input too; 0 for none.
+    presses: int = 4000  #: whose maps are learned from.
+    epochs: int = 100  #: checkpoints on the way.
+    steps: int = 500  #: of Adam in an epoch.
+    batch: int = 4096  #: pixels in a step.
+    rate: float = 5e-4  #: of Adam's first steps; it falls to zero as half a cosine.
 
 
 @dataclass(frozen=True)
 class TouchProfile:
-    """One trade of time for accuracy.
+    """One trade of time for accuracy."""
 
-    Attributes:
-        codes: of the surface.
-        perceptron: None for none.
-        presses: of each kind that errors are measured on.
-    """
-
-    codes: CodesSpec
-    perceptron: TouchPerceptronSpec | None
-    presses: int
+    codes: CodesSpec  #: of the surface.
+    perceptron: TouchPerceptronSpec | None  #: None for none.
+    presses: int  #: of each kind that errors are measured on.
 
 
 TOUCH_PROFILES: Mapping[str, TouchProfile] = MappingProxyType({

@@ -65,22 +65,15 @@ _CHUNK = 16
 
 @dataclass(frozen=True, eq=False)
 class AuthoredTouch:
-    """Networks and their worth.
+    """Networks and their worth."""
 
-    Attributes:
-        codes: to be written.
-        perceptron: to be written; None where the profile has none.
-        errors: ``"trained_places"``, ``"unseen_places"`` and ``"any_press"``, of the codes and of what costs
-            nothing to compare with: by a name with its unit.
-        settings: how they were made.
-        seconds: s on the clock of each stage.
-    """
-
-    codes: CodesPart
-    perceptron: PerceptronPart | None
+    codes: CodesPart  #: to be written.
+    perceptron: PerceptronPart | None  #: to be written; None where the profile has none.
     errors: Mapping[str, Mapping[str, Mapping[str, float]]]
-    settings: Settings
-    seconds: Mapping[str, float]
+    """``"trained_places"``, ``"unseen_places"`` and ``"any_press"``, of the codes and of what costs nothing
+    to compare with: by a name with its unit."""
+    settings: Settings  #: how they were made.
+    seconds: Mapping[str, float]  #: s on the clock of each stage.
 
 
 def author_touch(
@@ -161,17 +154,11 @@ def opened_codes(graph: ModelProto, nodes: SurfaceNodes, most_off: float, sensor
 
 @dataclass(frozen=True, eq=False)
 class CodedSurface:
-    """Codes and where they belong.
+    """Codes and where they belong."""
 
-    Attributes:
-        nodes: those of a surface that a gel can come to.
-        patches: their codes.
-        kept: share of the variance of heights that the basis keeps.
-    """
-
-    nodes: SurfaceNodes
-    patches: PatchCodes
-    kept: float
+    nodes: SurfaceNodes  #: those of a surface that a gel can come to.
+    patches: PatchCodes  #: their codes.
+    kept: float  #: share of the variance of heights that the basis keeps.
 
 
 def spaced_codes(
@@ -220,19 +207,12 @@ def _trained(
 
 @dataclass(frozen=True)
 class PatchSpec:
-    """How surfaces are coded.
+    """How surfaces are coded."""
 
-    Attributes:
-        spacing: m between nodes.
-        pitch: m, of a patch's pixels.
-        width: numbers of a code; None for the heights themselves.
-        learned: patches that the basis is found from, at most.
-    """
-
-    spacing: float
-    pitch: float
-    width: int | None = None
-    learned: int = 2000
+    spacing: float  #: m between nodes.
+    pitch: float  #: m, of a patch's pixels.
+    width: int | None = None  #: numbers of a code; None for the heights themselves.
+    learned: int = 2000  #: patches that the basis is found from, at most.
 
 
 def code_surface(

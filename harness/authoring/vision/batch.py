@@ -18,25 +18,16 @@ _EXTRAS = 4
 
 
 class Lesson(NamedTuple):
-    """What one network learns from; n places.
+    """What one network learns from; n places."""
 
-    Attributes:
-        encoded: ``(n, 3 + 6 octaves)``.
-        told: ``(n, directions)`` what the later layer is told; ``(n, 0)`` where lamps are drawn anew.
-        normals: ``(n, 3)``.
-        colours: ``(n, 3)`` linear; albedo where lamps are drawn anew.
-        depth: ``(n,)`` of ``Lessons``.
-        weight: ``(n,)`` of ``Lessons``.
-        lamps: ``(m, 3)`` to draw from; none where each place has its own light.
-    """
-
-    encoded: AnyArray
+    encoded: AnyArray  #: ``(n, 3 + 6 octaves)``.
     told: AnyArray
-    normals: AnyArray
-    colours: AnyArray
-    depth: AnyArray
-    weight: AnyArray
-    lamps: AnyArray
+    """``(n, directions)`` what the later layer is told; ``(n, 0)`` where lamps are drawn anew."""
+    normals: AnyArray  #: ``(n, 3)``.
+    colours: AnyArray  #: ``(n, 3)`` linear; albedo where lamps are drawn anew.
+    depth: AnyArray  #: ``(n,)`` of ``Lessons``.
+    weight: AnyArray  #: ``(n,)`` of ``Lessons``.
+    lamps: AnyArray  #: ``(m, 3)`` to draw from; none where each place has its own light.
 
 
 class Batch(NamedTuple):

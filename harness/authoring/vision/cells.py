@@ -48,13 +48,6 @@ class CellTraining:
         density_scale: 1/m of a density of 1.
         seed: of first weights, and of what is drawn.
         threads: None for as many as the process has cores.
-
-    Attributes:
-        losses: of the networks that were trained, in their order.
-        epoch: that is next.
-        by_cell: what each learns from.
-        flats: ``(networks, parameters)`` float32.
-        identity: hash of all that the networks depend on.
     """
 
     def __init__(
@@ -70,15 +63,18 @@ class CellTraining:
         self.spec, self.grid, self.scale, self.seed = spec, grid, density_scale, seed
         self.threads = own_cores() if threads is None else threads
         self.by_cell = CellLessons(spec.size, grid, lessons, lamps, spec.overlap, spec.least)
+        """what each learns from."""
         self.flats = np.zeros((len(grid), parameter_count(spec.size)), np.float32)
-        self.losses: list[float] = []
-        self.epoch = 0
+        """``(networks, parameters)`` float32."""
+        self.losses: list[float] = []  #: of the networks that were trained, in their order.
+        self.epoch = 0  #: that is next.
         self.identity = digest(
             [
                 *("vision cells", VERSION, list(astuple(spec)), seed, grid.low, grid.cell, grid.cells),
                 *(lessons.points, lessons.normals, lessons.colours, lessons.lamps, lamps, density_scale),
             ]
         )
+        """hash of all that the networks depend on."""
         self._begin = first_weights(spec.size, seed)
 
     @property

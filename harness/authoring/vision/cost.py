@@ -38,21 +38,13 @@ _SAMPLES = 4
 
 @dataclass(frozen=True)
 class Way:
-    """One way to a picture: a knob at one of its levels, all others at their default.
+    """One way to a picture: a knob at one of its levels, all others at their default."""
 
-    Attributes:
-        knob: its name, with a unit where it has one.
-        level: for people.
-        networks: that are asked, by how they are trained.
-        side: pixels.
-        settings: of the renderer.
-    """
-
-    knob: str
-    level: str
-    networks: CellsSpec
-    side: int
-    settings: RenderSettings = field(default_factory=RenderSettings)
+    knob: str  #: its name, with a unit where it has one.
+    level: str  #: for people.
+    networks: CellsSpec  #: that are asked, by how they are trained.
+    side: int  #: pixels.
+    settings: RenderSettings = field(default_factory=RenderSettings)  #: of the renderer.
 
 
 def ways(spec: CellsSpec, side: int) -> tuple[Way, ...]:
@@ -82,57 +74,35 @@ def ways(spec: CellsSpec, side: int) -> tuple[Way, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Worth:
-    """What one way asks of networks, and what its pictures err by.
+    """What one way asks of networks, and what its pictures err by."""
 
-    Attributes:
-        samples: a picture, in the mean.
-        rays: a picture, in the mean.
-        networks: in all.
-        file_bytes: of the file of its networks.
-        errors: grey levels from the exact picture of each view, root mean square.
-        exact: errors against exact pictures, by ``picture_errors``'s names.
-    """
-
-    samples: float
-    rays: float
-    networks: int
-    file_bytes: int
-    errors: tuple[float, ...]
-    exact: Mapping[str, float]
+    samples: float  #: a picture, in the mean.
+    rays: float  #: a picture, in the mean.
+    networks: int  #: in all.
+    file_bytes: int  #: of the file of its networks.
+    errors: tuple[float, ...]  #: grey levels from the exact picture of each view, root mean square.
+    exact: Mapping[str, float]  #: errors against exact pictures, by ``picture_errors``'s names.
 
 
 @dataclass(frozen=True, eq=False)
 class PictureCost:
-    """What one way is worth and costs.
+    """What one way is worth and costs."""
 
-    Attributes:
-        way: to the picture.
-        worth: of its pictures.
-        point: errors and seconds, a sample for each view.
-    """
-
-    way: Way
-    worth: Worth
-    point: Point
+    way: Way  #: to the picture.
+    worth: Worth  #: of its pictures.
+    point: Point  #: errors and seconds, a sample for each view.
 
 
 @dataclass(frozen=True, eq=False)
 class Studio:
-    """An object, what it is seen by, and its networks; each is made once.
+    """An object, what it is seen by, and its networks; each is made once."""
 
-    Attributes:
-        lit: the object.
-        held_out: cameras and lights that no network is shown.
-        threads: that share the work; None for as many as the process has cores.
-        renderers: by how their networks were trained.
-        file_bytes: of the file of networks, likewise.
-    """
-
-    lit: LitObject
-    held_out: HeldOutViews
-    threads: int | None = None
+    lit: LitObject  #: the object.
+    held_out: HeldOutViews  #: cameras and lights that no network is shown.
+    threads: int | None = None  #: that share the work; None for as many as the process has cores.
     renderers: dict[CellsSpec, VisionRenderer] = field(default_factory=dict)
-    file_bytes: dict[CellsSpec, int] = field(default_factory=dict)
+    """by how their networks were trained."""
+    file_bytes: dict[CellsSpec, int] = field(default_factory=dict)  #: of the file of networks, likewise.
     _exact: dict[int, list[LinearImage]] = field(default_factory=dict)
 
     def train(self, spec: CellsSpec, seed: int, folder: Path, report: Report) -> None:

@@ -32,17 +32,11 @@ LEAST_YIELD = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class HeldOutViews:
-    """Cameras and lights that only judge.
+    """Cameras and lights that only judge."""
 
-    Attributes:
-        cameras: one for each picture.
-        lights: one for each picture.
-        apart: rad that everything else keeps from them.
-    """
-
-    cameras: tuple[Pinhole, ...]
-    lights: tuple[DirectionalLight, ...]
-    apart: float = APART
+    cameras: tuple[Pinhole, ...]  #: one for each picture.
+    lights: tuple[DirectionalLight, ...]  #: one for each picture.
+    apart: float = APART  #: rad that everything else keeps from them.
 
     def __post_init__(self) -> None:
         if len(self.cameras) != len(self.lights):
@@ -72,23 +66,14 @@ class HeldOutViews:
 
 @dataclass(frozen=True, eq=False)
 class Tuples:
-    """What leaves places of a surface towards an eye; n of each.
+    """What leaves places of a surface towards an eye; n of each."""
 
-    Attributes:
-        points: ``(n, 3)`` m, in the object's frame.
-        views: ``(n, 3)`` unit, from the camera into the picture.
-        lights: ``(n, 3)`` unit, towards the lamp.
-        visible: ``(n,)`` whether the place faces the lamp and nothing is in between.
-        normals: ``(n, 3)`` unit, smooth, on the side that is seen.
-        colours: ``(n, 3)`` linear, under irradiance pi.
-    """
-
-    points: FloatArray
-    views: FloatArray
-    lights: FloatArray
-    visible: BoolArray
-    normals: FloatArray
-    colours: FloatArray
+    points: FloatArray  #: ``(n, 3)`` m, in the object's frame.
+    views: FloatArray  #: ``(n, 3)`` unit, from the camera into the picture.
+    lights: FloatArray  #: ``(n, 3)`` unit, towards the lamp.
+    visible: BoolArray  #: ``(n,)`` whether the place faces the lamp and nothing is in between.
+    normals: FloatArray  #: ``(n, 3)`` unit, smooth, on the side that is seen.
+    colours: FloatArray  #: ``(n, 3)`` linear, under irradiance pi.
 
     def __len__(self) -> int:
         return len(self.points)

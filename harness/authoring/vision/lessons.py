@@ -44,27 +44,18 @@ _SHALLOW = 1.8
 
 @dataclass(frozen=True, eq=False)
 class Lessons:
-    """Places that are asked, n of each.
+    """Places that are asked, n of each."""
 
-    Attributes:
-        points: ``(n, 3)`` m, object frame: beside the surface.
-        normals: ``(n, 3)`` float32 unit, of the surface there, on the side that is seen.
-        colours: ``(n, 3)`` float32, linear: albedo; what leaves it where it has a lamp of its own.
-        depth: ``(n,)`` float32, voxels behind where the density begins, -1 to 1: below zero is empty.
-        weight: ``(n,)`` float32, of the colour; 0 where no ray takes it from.
-        views: ``(n, 3)`` float32 unit, from the camera.
-        lamps: ``(n, 3)`` float32 unit, towards a lamp of its own; ``(n, 0)`` without.
-        seen: ``(n, 1)`` float32, 1 where that lamp is said to be seen; ``(n, 0)`` where nothing is said.
-    """
-
-    points: FloatArray
-    normals: AnyArray
-    colours: AnyArray
+    points: FloatArray  #: ``(n, 3)`` m, object frame: beside the surface.
+    normals: AnyArray  #: ``(n, 3)`` float32 unit, of the surface there, on the side that is seen.
+    colours: AnyArray  #: ``(n, 3)`` float32, linear: albedo; what leaves it where it has a lamp of its own.
     depth: AnyArray
-    weight: AnyArray
-    views: AnyArray
-    lamps: AnyArray
+    """``(n,)`` float32, voxels behind where the density begins, -1 to 1: below zero is empty."""
+    weight: AnyArray  #: ``(n,)`` float32, of the colour; 0 where no ray takes it from.
+    views: AnyArray  #: ``(n, 3)`` float32 unit, from the camera.
+    lamps: AnyArray  #: ``(n, 3)`` float32 unit, towards a lamp of its own; ``(n, 0)`` without.
     seen: AnyArray
+    """``(n, 1)`` float32, 1 where that lamp is said to be seen; ``(n, 0)`` where nothing is said."""
 
     def __len__(self) -> int:
         return len(self.points)

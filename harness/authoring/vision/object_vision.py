@@ -26,19 +26,12 @@ from harness.sim.solid.surface_source import surface_of
 
 @dataclass(frozen=True, eq=False)
 class BuiltVision:
-    """An ObjectFile and how it came about.
+    """An ObjectFile and how it came about."""
 
-    Attributes:
-        object: on disk.
-        vision: its networks and errors.
-        said: what was done to the mesh and its colours, and what to look at.
-        seconds: s on the clock of each stage.
-    """
-
-    object: ObjectFile
-    vision: AuthoredVision
-    said: tuple[str, ...]
-    seconds: Mapping[str, float]
+    object: ObjectFile  #: on disk.
+    vision: AuthoredVision  #: its networks and errors.
+    said: tuple[str, ...]  #: what was done to the mesh and its colours, and what to look at.
+    seconds: Mapping[str, float]  #: s on the clock of each stage.
 
 
 def build_vision(

@@ -11,31 +11,18 @@ from harness.objectfile.vision.network import CELLS, PAPER, NetworkSize
 
 @dataclass(frozen=True)
 class CellsSpec:
-    """Tiny networks, each trained on its own cell.
+    """Tiny networks, each trained on its own cell."""
 
-    Attributes:
-        size: of each network.
-        cells: along 1.2 times the object's longest side.
-        places: of the surface that all learn from together.
-        steps: of Adam, of each network.
-        batch: places in a step.
-        rate: of Adam's first steps; it falls to zero as half a cosine.
-        hidden: share of lamps that are hidden.
-        opacity: weight of the density's errors beside the colours'.
-        overlap: cells by which each learns from beyond its border, so that neighbours agree.
-        least: places that a cell learns from at least, its neighbours' if it has fewer.
-    """
-
-    size: NetworkSize
-    cells: int = CELLS
-    places: int = 2_000_000
-    steps: int = 4000
-    batch: int = 64
-    rate: float = 8e-3
-    hidden: float = 0.2
-    opacity: float = 0.02
-    overlap: float = 0.06
-    least: int = 512
+    size: NetworkSize  #: of each network.
+    cells: int = CELLS  #: along 1.2 times the object's longest side.
+    places: int = 2_000_000  #: of the surface that all learn from together.
+    steps: int = 4000  #: of Adam, of each network.
+    batch: int = 64  #: places in a step.
+    rate: float = 8e-3  #: of Adam's first steps; it falls to zero as half a cosine.
+    hidden: float = 0.2  #: share of lamps that are hidden.
+    opacity: float = 0.02  #: weight of the density's errors beside the colours'.
+    overlap: float = 0.06  #: cells by which each learns from beyond its border, so that neighbours agree.
+    least: int = 512  #: places that a cell learns from at least, its neighbours' if it has fewer.
 
     def __post_init__(self) -> None:
         if min(self.places, self.steps, self.batch, self.least) < 1 or not 0.0 <= self.overlap <= 0.5:
@@ -52,24 +39,17 @@ class CellsSpec:
 
 @dataclass(frozen=True)
 class VisionProfile:
-    """One trade of time for accuracy.
+    """One trade of time for accuracy."""
 
-    Attributes:
-        networks: that are made.
-        strict: networks told no more than the paper's, made and judged beside and not kept; None for none.
-        pictures: kept back, by which they are judged.
-        side: pixels of those pictures.
-        samples: a side of a pixel of the reference.
-        edge: m between vertices of a built-in object, of which pictures are drawn. At that of touch and
-            sound, 3 mm, the object's mesh serves and no finer one is written beside it.
-    """
-
-    networks: CellsSpec
-    pictures: int
+    networks: CellsSpec  #: that are made.
+    pictures: int  #: kept back, by which they are judged.
     strict: CellsSpec | None = None
-    side: int = 256
-    samples: int = 4
+    """networks told no more than the paper's, made and judged beside and not kept; None for none."""
+    side: int = 256  #: pixels of those pictures.
+    samples: int = 4  #: a side of a pixel of the reference.
     edge: float = 1.5e-3
+    """m between vertices of a built-in object, of which pictures are drawn. At that of touch and sound, 3 mm,
+    the object's mesh serves and no finer one is written beside it."""
 
     def __post_init__(self) -> None:
         if self.strict is not None and self.strict.size.kind != "osf":

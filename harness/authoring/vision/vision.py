@@ -35,20 +35,14 @@ Settings = dict[str, str | float | int | bool | None]
 
 @dataclass(frozen=True, eq=False)
 class AuthoredVision:
-    """Networks and their worth.
+    """Networks and their worth."""
 
-    Attributes:
-        model: in float16, to be written; for the look's mesh.
-        errors: of pictures kept back, by a name with its unit (``vision_metrics.picture_errors``); those of
-            networks told no more than the paper's begin with ``strict_``.
-        settings: how they were made.
-        seconds: s on the clock of each stage.
-    """
-
-    model: VisionModel
+    model: VisionModel  #: in float16, to be written; for the look's mesh.
     errors: Mapping[str, float]
-    settings: Settings
-    seconds: Mapping[str, float]
+    """of pictures kept back, by a name with its unit (``vision_metrics.picture_errors``); those of networks
+    told no more than the paper's begin with ``strict_``."""
+    settings: Settings  #: how they were made.
+    seconds: Mapping[str, float]  #: s on the clock of each stage.
 
 
 def author_vision(

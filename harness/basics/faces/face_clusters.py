@@ -21,20 +21,14 @@ _WIDER = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class FaceClusters:
-    """Every face once, beside its neighbours.
-
-    Attributes:
-        corners: ``(clusters, 9, CLUSTER)`` metres: x, y and z of the first, second and third corner of each
-            face, in the object's frame; NaN where the last cluster has no more faces.
-        faces: ``(clusters, CLUSTER)`` which face of the mesh each is; -1 where there is none.
-        boxes: ``(clusters, 6)`` metres: centre and half the size of the box around each cluster.
-        groups: ``(groups, 6)`` the same of every ``CLUSTER`` clusters that follow one another.
-    """
+    """Every face once, beside its neighbours."""
 
     corners: FloatArray
-    faces: IntArray
-    boxes: FloatArray
-    groups: FloatArray
+    """``(clusters, 9, CLUSTER)`` metres: x, y and z of the first, second and third corner of each face, in
+    the object's frame; NaN where the last cluster has no more faces."""
+    faces: IntArray  #: ``(clusters, CLUSTER)`` which face of the mesh each is; -1 where there is none.
+    boxes: FloatArray  #: ``(clusters, 6)`` metres: centre and half the size of the box around each cluster.
+    groups: FloatArray  #: ``(groups, 6)`` the same of every ``CLUSTER`` clusters that follow one another.
 
 
 def corners_to_raster(mesh: Mesh) -> FloatArray:

@@ -14,21 +14,13 @@ _MOST_CELLS_A_SIDE = 64
 
 @dataclass(frozen=True, eq=False)
 class FaceGrid:
-    """Which faces may pass through each cell of a box around the mesh.
+    """Which faces may pass through each cell of a box around the mesh."""
 
-    Attributes:
-        origin: ``(3,)`` metres, the box's least corner, in the object's frame.
-        cell: metres, the edge of a cell.
-        shape: ``(3,)`` cells along x, y, z.
-        starts: ``(cells + 1,)`` where each cell's list begins in ``faces``.
-        faces: indices of faces whose bounding box meets the cell.
-    """
-
-    origin: FloatArray
-    cell: float
-    shape: IntArray
-    starts: IntArray
-    faces: IntArray
+    origin: FloatArray  #: ``(3,)`` metres, the box's least corner, in the object's frame.
+    cell: float  #: metres, the edge of a cell.
+    shape: IntArray  #: ``(3,)`` cells along x, y, z.
+    starts: IntArray  #: ``(cells + 1,)`` where each cell's list begins in ``faces``.
+    faces: IntArray  #: indices of faces whose bounding box meets the cell.
 
 
 def build_face_grid(mesh: Mesh) -> FaceGrid:

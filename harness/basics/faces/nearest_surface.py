@@ -18,13 +18,9 @@ _SLACK = 1.0 + 1e-9
 
 @dataclass(frozen=True, eq=False)
 class NearestSurface:
-    """The exact nearest place of a mesh to any point; sorted on first use.
+    """The exact nearest place of a mesh to any point; sorted on first use."""
 
-    Attributes:
-        mesh: m, one face or more, all corners finite.
-    """
-
-    mesh: Mesh
+    mesh: Mesh  #: m, one face or more, all corners finite.
 
     def places(self, points: FloatArray) -> tuple[FloatArray, IntArray]:
         """``(n, 3)`` m nearest places to ``(n, 3)`` finite points, and ``(n,)`` the faces that they are on.

@@ -17,31 +17,21 @@ LEAST = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """What rays met first.
+    """What rays met first."""
 
-    Attributes:
-        distance: ``(n,)`` m along the ray; +inf where nothing was met.
-        face: ``(n,)`` index; -1 where nothing was met.
-        weights: ``(n, 2)`` of the face's second and third corner, 0 to 1.
-    """
-
-    distance: FloatArray
-    face: IntArray
-    weights: FloatArray
+    distance: FloatArray  #: ``(n,)`` m along the ray; +inf where nothing was met.
+    face: IntArray  #: ``(n,)`` index; -1 where nothing was met.
+    weights: FloatArray  #: ``(n, 2)`` of the face's second and third corner, 0 to 1.
 
 
 class RayMesh:
     """A mesh prepared once for any number of rays; read-only and safe to share by threads.
 
     Faces stop rays from both sides.
-
-    Attributes:
-        mesh: in metres, in the object's frame.
-        least: m, how far from where a ray begins a blocker is one.
     """
 
-    mesh: Mesh
-    least: float
+    mesh: Mesh  #: in metres, in the object's frame.
+    least: float  #: m, how far from where a ray begins a blocker is one.
 
     def __init__(self, mesh: Mesh) -> None:
         """Sort the faces.

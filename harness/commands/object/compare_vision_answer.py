@@ -26,38 +26,23 @@ _MANY_OUTLIERS = 0.25
 
 @dataclass(frozen=True, eq=False)
 class ComparedPhoto:
-    """What a camera saw, and how it was simulated.
+    """What a camera saw, and how it was simulated."""
 
-    Attributes:
-        live: ``(rows, columns, 3)`` RGB.
-        camera: in the object's frame.
-        lamps: one or more.
-        assumed: whether nobody said where the light comes from.
-    """
-
-    live: "ByteArray"
-    camera: "Pinhole"
-    lamps: "tuple[Lamp, ...]"
-    assumed: bool
+    live: "ByteArray"  #: ``(rows, columns, 3)`` RGB.
+    camera: "Pinhole"  #: in the object's frame.
+    lamps: "tuple[Lamp, ...]"  #: one or more.
+    assumed: bool  #: whether nobody said where the light comes from.
 
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """A comparison, and all that is said of it.
+    """A comparison, and all that is said of it."""
 
-    Attributes:
-        of: the object.
-        vision: its look.
-        seen: by the camera.
-        found: how both differ.
-        seconds: s on the clock by stage, before the comparison; ``draw`` adds its own.
-    """
-
-    of: "ObjectFile"
-    vision: "ObjectVision"
-    seen: ComparedPhoto
-    found: "LiveComparison"
-    seconds: dict[str, float]
+    of: "ObjectFile"  #: the object.
+    vision: "ObjectVision"  #: its look.
+    seen: ComparedPhoto  #: by the camera.
+    found: "LiveComparison"  #: how both differ.
+    seconds: dict[str, float]  #: s on the clock by stage, before the comparison; ``draw`` adds its own.
 
 
 def draw(compared: Compared, out: Path) -> None:

@@ -30,27 +30,16 @@ _FIRST = 3.0
 
 @dataclass(frozen=True, eq=False)
 class RenderedSound:
-    """A sound, and all that is said of it.
+    """A sound, and all that is said of it."""
 
-    Attributes:
-        of: the object.
-        audio: its sound at a level.
-        place: that was struck.
-        blow: that struck it.
-        made: the sound.
-        duration: s.
-        distance: m, at which it is a pressure; None for the bare modes.
-        seconds: s on the clock by stage.
-    """
-
-    of: "ObjectFile"
-    audio: "ObjectAudio"
-    place: "Place"
-    blow: "HammerBlow"
-    made: "StruckSound"
-    duration: float
-    distance: float | None
-    seconds: dict[str, float]
+    of: "ObjectFile"  #: the object.
+    audio: "ObjectAudio"  #: its sound at a level.
+    place: "Place"  #: that was struck.
+    blow: "HammerBlow"  #: that struck it.
+    made: "StruckSound"  #: the sound.
+    duration: float  #: s.
+    distance: float | None  #: m, at which it is a pressure; None for the bare modes.
+    seconds: dict[str, float]  #: s on the clock by stage.
 
 
 @dataclass(frozen=True)

@@ -23,25 +23,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class RenderedPress:
-    """A press, and all that is said of it.
+    """A press, and all that is said of it."""
 
-    Attributes:
-        of: the object.
-        touch: its touch at a level.
-        place: that was pressed.
-        pose: depth in m; tilt, azimuth and yaw in rad.
-        press: drawn from that level.
-        reference: drawn from the rasteriser; None where that is the level.
-        seconds: s on the clock by stage.
-    """
-
-    of: "ObjectFile"
-    touch: "ObjectTouch"
-    place: "ContactPlace"
-    pose: tuple[float, float, float, float]
-    press: "Press"
-    reference: "Press | None"
-    seconds: dict[str, float]
+    of: "ObjectFile"  #: the object.
+    touch: "ObjectTouch"  #: its touch at a level.
+    place: "ContactPlace"  #: that was pressed.
+    pose: tuple[float, float, float, float]  #: depth in m; tilt, azimuth and yaw in rad.
+    press: "Press"  #: drawn from that level.
+    reference: "Press | None"  #: drawn from the rasteriser; None where that is the level.
+    seconds: dict[str, float]  #: s on the clock by stage.
 
 
 def render(
@@ -145,19 +135,12 @@ def render(
 
 @dataclass(frozen=True, eq=False)
 class _Pressing:
-    """What presses.
+    """What presses."""
 
-    Attributes:
-        gel: that is pressed.
-        pose: depth in m; tilt, azimuth and yaw in rad.
-        levels: of its force.
-        force: whether that is computed.
-    """
-
-    gel: "Gel"
-    pose: tuple[float, float, float, float]
-    levels: list[str]
-    force: bool
+    gel: "Gel"  #: that is pressed.
+    pose: tuple[float, float, float, float]  #: depth in m; tilt, azimuth and yaw in rad.
+    levels: list[str]  #: of its force.
+    force: bool  #: whether that is computed.
 
 
 def _rendered(

@@ -21,21 +21,13 @@ _WHITE = 255
 
 @dataclass(frozen=True, eq=False)
 class RenderedLook:
-    """Pictures, and all that is said of them.
+    """Pictures, and all that is said of them."""
 
-    Attributes:
-        of: the object.
-        vision: its look.
-        views: a camera and a light for each picture.
-        pictures: of the views.
-        seconds: s on the clock by stage.
-    """
-
-    of: "ObjectFile"
-    vision: "ObjectVision"
-    views: tuple[View, ...]
-    pictures: "tuple[Rendered, ...]"
-    seconds: dict[str, float]
+    of: "ObjectFile"  #: the object.
+    vision: "ObjectVision"  #: its look.
+    views: tuple[View, ...]  #: a camera and a light for each picture.
+    pictures: "tuple[Rendered, ...]"  #: of the views.
+    seconds: dict[str, float]  #: s on the clock by stage.
 
 
 def sheet(found: RenderedLook) -> "ByteArray":

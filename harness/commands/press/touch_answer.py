@@ -17,27 +17,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Touched:
-    """A press and where it came from.
+    """A press and where it came from."""
 
-    Attributes:
-        press: as it was drawn.
-        source: the mesh or the height map.
-        place: on the mesh; None for a height map.
-        gel_from_object: ``(4, 4)``; None for a height map.
-        asked: depth and angles in SI units; empty for a height map.
-        said: by the mesh's intake.
-        live: what a camera saw; None without.
-        seconds: s before the effects ran.
-    """
-
-    press: "Press"
-    source: str
-    place: "ContactPlace | None" = None
-    gel_from_object: "FloatArray | None" = None
+    press: "Press"  #: as it was drawn.
+    source: str  #: the mesh or the height map.
+    place: "ContactPlace | None" = None  #: on the mesh; None for a height map.
+    gel_from_object: "FloatArray | None" = None  #: ``(4, 4)``; None for a height map.
     asked: Mapping[str, float] = field(default_factory=dict)
-    said: tuple[str, ...] = ()
-    live: "ByteArray | None" = None
-    seconds: Mapping[str, float] = field(default_factory=dict)
+    """depth and angles in SI units; empty for a height map."""
+    said: tuple[str, ...] = ()  #: by the mesh's intake.
+    live: "ByteArray | None" = None  #: what a camera saw; None without.
+    seconds: Mapping[str, float] = field(default_factory=dict)  #: s before the effects ran.
 
     def compared(self, live: "ByteArray | None", before: Mapping[str, float]) -> "Touched":
         """The same beside what a camera saw.

@@ -31,38 +31,23 @@ from harness.report.run_page import write_run_page
 
 @dataclass(frozen=True, eq=False)
 class PlannedRun:
-    """A run whose folder is there.
+    """A run whose folder is there."""
 
-    Attributes:
-        experiment: that it is of.
-        recording: its folder.
-        accuracy: of the answer, where no target chooses it.
-        target: a budget or an error that the answer is to keep; None where levels are given.
-    """
-
-    experiment: Experiment
-    recording: Recording
-    accuracy: Accuracy
-    target: Target | None
+    experiment: Experiment  #: that it is of.
+    recording: Recording  #: its folder.
+    accuracy: Accuracy  #: of the answer, where no target chooses it.
+    target: Target | None  #: a budget or an error that the answer is to keep; None where levels are given.
 
 
 @dataclass(frozen=True)
 class BenchOptions:
-    """On which bench a run is made, and from what it is drawn; None for what station and scene say.
+    """On which bench a run is made, and from what it is drawn; None for what station and scene say."""
 
-    Attributes:
-        station: its name or file; the mocked bench where None.
-        seed: of all that is drawn.
-        gap: between a mocked bench and its model.
-        bench: how a mocked one is run.
-        out: folder of the run.
-    """
-
-    station: str | None = None
-    seed: int | None = None
-    gap: str | None = None
-    bench: str | None = None
-    out: Path | None = None
+    station: str | None = None  #: its name or file; the mocked bench where None.
+    seed: int | None = None  #: of all that is drawn.
+    gap: str | None = None  #: between a mocked bench and its model.
+    bench: str | None = None  #: how a mocked one is run.
+    out: Path | None = None  #: folder of the run.
 
 
 def new_run(

@@ -48,19 +48,12 @@ class NetworkShapes:
 
 @dataclass(frozen=True, eq=False)
 class TableShapes:
-    """Shapes at the nodes of a surface, linear between the three of the face nearest to a point.
+    """Shapes at the nodes of a surface, linear between the three of the face nearest to a point."""
 
-    Attributes:
-        table: ``(nodes, m, 3)``.
-        scales: ``(m,)`` 1/sqrt(kg).
-        search: over the surface of the nodes.
-        near: m, where the surface may well be from a point.
-    """
-
-    table: HalfArray
-    scales: FloatArray
-    search: SurfaceSearch
-    near: float
+    table: HalfArray  #: ``(nodes, m, 3)``.
+    scales: FloatArray  #: ``(m,)`` 1/sqrt(kg).
+    search: SurfaceSearch  #: over the surface of the nodes.
+    near: float  #: m, where the surface may well be from a point.
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """``(n, m, 3)`` at ``(n, 3)`` points."""
@@ -76,25 +69,15 @@ class TableShapes:
 
 @dataclass(frozen=True, eq=False)
 class ObjectAudio:
-    """The modes of one object, and their shapes near its surface.
+    """The modes of one object, and their shapes near its surface."""
 
-    Attributes:
-        level: where the shapes come from.
-        frequencies: ``(m,)`` Hz, ascending, undamped.
-        dampings: ``(m,)`` 1/s: a mode decays as ``exp(-d t)``.
-        entry: what ``object.json`` says.
-        most: m, the farthest from the surface that a point may be.
-        surface: the object's; points are to be near to it.
-        shapes: at points that were looked at.
-    """
-
-    level: AudioLevel
-    frequencies: FloatArray
-    dampings: FloatArray
-    entry: AudioEntry
-    most: float
-    surface: SurfaceSearch
-    shapes: NetworkShapes | TableShapes
+    level: AudioLevel  #: where the shapes come from.
+    frequencies: FloatArray  #: ``(m,)`` Hz, ascending, undamped.
+    dampings: FloatArray  #: ``(m,)`` 1/s: a mode decays as ``exp(-d t)``.
+    entry: AudioEntry  #: what ``object.json`` says.
+    most: float  #: m, the farthest from the surface that a point may be.
+    surface: SurfaceSearch  #: the object's; points are to be near to it.
+    shapes: NetworkShapes | TableShapes  #: at points that were looked at.
 
     def at(self, points: FloatArray) -> FloatArray:
         """``(n, m, 3)`` 1/sqrt(kg): mass-normalised shapes at ``(n, 3)`` points, m in the object's frame.

@@ -45,17 +45,12 @@ _PEAKED = 1.25 * DURATION
 
 @dataclass(frozen=True, eq=False)
 class HammerBlow:
-    """A force on a place of an object, and how it passes.
+    """A force on a place of an object, and how it passes."""
 
-    Attributes:
-        direction: ``(3,)`` of unit length, of the force on the object, in its frame.
-        impulse: N s, all of it.
-        pulse: how the force rises and falls; None where all of it comes in one instant.
-    """
-
-    direction: FloatArray
-    impulse: float
+    direction: FloatArray  #: ``(3,)`` of unit length, of the force on the object, in its frame.
+    impulse: float  #: N s, all of it.
     pulse: HertzPulse | None = None
+    """how the force rises and falls; None where all of it comes in one instant."""
 
     @classmethod
     def instant(cls, impulse: ArrayLike) -> Self:

@@ -35,15 +35,10 @@ PAPER_ENCODING = Encoding.octaves(10)
 
 @dataclass(frozen=True, eq=False)
 class OutputScales:
-    """``gain = output * factor + offset``, folded into the last layer.
+    """``gain = output * factor + offset``, folded into the last layer."""
 
-    Attributes:
-        factor: ``(m, 3)`` 1/sqrt(kg), for each mode and direction.
-        offset: ``(m, 3)`` 1/sqrt(kg).
-    """
-
-    factor: FloatArray
-    offset: FloatArray
+    factor: FloatArray  #: ``(m, 3)`` 1/sqrt(kg), for each mode and direction.
+    offset: FloatArray  #: ``(m, 3)`` 1/sqrt(kg).
 
 
 def audio_graph(

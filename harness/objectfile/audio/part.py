@@ -37,25 +37,16 @@ _TOLERANCE = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class AudioPart:
-    """A sound to be written.
+    """A sound to be written."""
 
-    Attributes:
-        modes: of the finite-element mesh; its surface is where the table is exact.
-        dampings: ``(m,)`` 1/s.
-        near_surface: m, the farthest from the object's surface that a query may be.
-        provenance: of the sound.
-        graph: of the network (``audio_graph``); None for a table alone.
-        table: whether the exact shapes are kept too.
-        measured: errors of each level, ``"network"`` and ``"table"``, by a name with its unit.
-    """
-
-    modes: Modes
-    dampings: FloatArray
-    near_surface: float
-    provenance: Provenance
-    graph: ModelProto | None
-    table: bool = True
+    modes: Modes  #: of the finite-element mesh; its surface is where the table is exact.
+    dampings: FloatArray  #: ``(m,)`` 1/s.
+    near_surface: float  #: m, the farthest from the object's surface that a query may be.
+    provenance: Provenance  #: of the sound.
+    graph: ModelProto | None  #: of the network (``audio_graph``); None for a table alone.
+    table: bool = True  #: whether the exact shapes are kept too.
     measured: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """errors of each level, ``"network"`` and ``"table"``, by a name with its unit."""
 
 
 def with_audio(of: ObjectFile, part: AudioPart) -> ObjectFile:

@@ -29,42 +29,25 @@ _CREASE = 0.8
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A place of a surface.
+    """A place of a surface."""
 
-    Attributes:
-        point: ``(3,)`` m, in the object's frame, on the surface.
-        normal: ``(3,)`` of unit length, outward.
-        moved: m, from where it was asked for.
-        vertex: of the mesh, where it was asked for by its number.
-    """
-
-    point: FloatArray
-    normal: FloatArray
-    moved: float = 0.0
-    vertex: int | None = None
+    point: FloatArray  #: ``(3,)`` m, in the object's frame, on the surface.
+    normal: FloatArray  #: ``(3,)`` of unit length, outward.
+    moved: float = 0.0  #: m, from where it was asked for.
+    vertex: int | None = None  #: of the mesh, where it was asked for by its number.
 
 
 @dataclass(frozen=True, eq=False)
 class StruckSound:
-    """A sound and what it is made of.
+    """A sound and what it is made of."""
 
-    Attributes:
-        sound: ``(t,)`` of the surface's modes: kg^(1/2) m/s; Pa where ``loudness`` was given.
-        rate: samples per second.
-        gains: ``(m,)`` 1/sqrt(kg), of each mode along the force.
-        amplitudes: ``(m,)`` in the sound's unit, of each mode from the blow on.
-        left_out: ``(m,)`` modes at or above half of the rate.
-        error: dB against the sound's own peak: of the sum, see ``Synthesis.error``.
-        seconds: s on the clock: ``"gains"``, ``"synthesis"``.
-    """
-
-    sound: FloatArray
-    rate: float
-    gains: FloatArray
-    amplitudes: FloatArray
-    left_out: BoolArray
-    error: float
-    seconds: Mapping[str, float]
+    sound: FloatArray  #: ``(t,)`` of the surface's modes: kg^(1/2) m/s; Pa where ``loudness`` was given.
+    rate: float  #: samples per second.
+    gains: FloatArray  #: ``(m,)`` 1/sqrt(kg), of each mode along the force.
+    amplitudes: FloatArray  #: ``(m,)`` in the sound's unit, of each mode from the blow on.
+    left_out: BoolArray  #: ``(m,)`` modes at or above half of the rate.
+    error: float  #: dB against the sound's own peak: of the sum, see ``Synthesis.error``.
+    seconds: Mapping[str, float]  #: s on the clock: ``"gains"``, ``"synthesis"``.
 
     @property
     def peak(self) -> float:

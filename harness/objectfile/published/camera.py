@@ -27,17 +27,11 @@ _OFF = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class PublishedView:
-    """Where a picture is taken from, and in which light.
+    """Where a picture is taken from, and in which light."""
 
-    Attributes:
-        eye: ``(3,)``, in the vision frame.
-        rotation: ``(3, 3)``: vision from camera.
-        light: ``(3,)`` as the network takes it.
-    """
-
-    eye: FloatArray
-    rotation: FloatArray
-    light: FloatArray
+    eye: FloatArray  #: ``(3,)``, in the vision frame.
+    rotation: FloatArray  #: ``(3, 3)``: vision from camera.
+    light: FloatArray  #: ``(3,)`` as the network takes it.
 
     def directions(self, size: int, offset: float) -> FloatArray:
         """``(size * size, 3)``: of the rays, row by row.

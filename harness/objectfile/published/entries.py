@@ -23,20 +23,14 @@ class PublishedGainsEntry(Entry):
     """Sound of ObjectFolder 2.0: modes, and their gains for a unit force along x, y and z.
 
     ``s(t) = sum_i g_i exp(-|d_i| t) sin(2 pi f_i t)``
-
-    Attributes:
-        frequencies_hz: Hz, as published: of the damped modes, in any order.
-        dampings_per_s: 1/s, as published; their sign is ignored.
-        low_m: m, least corner of the box that points may lie in.
-        high_m: m, greatest corner.
-        network: points to gains, whose unit the file does not state.
     """
 
     frequencies_hz: Annotated[tuple[float, ...], Field(min_length=1)]
-    dampings_per_s: tuple[float, ...]
-    low_m: Point
-    high_m: Point
-    network: NetworkEntry
+    """Hz, as published: of the damped modes, in any order."""
+    dampings_per_s: tuple[float, ...]  #: 1/s, as published; their sign is ignored.
+    low_m: Point  #: m, least corner of the box that points may lie in.
+    high_m: Point  #: m, greatest corner.
+    network: NetworkEntry  #: points to gains, whose unit the file does not state.
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -50,97 +44,59 @@ class PublishedGainsEntry(Entry):
 
 
 class PublishedSpectrumEntry(Entry):
-    """Sound of ObjectFolder 1.0: short-time spectra for a unit force along x, y and z.
+    """Sound of ObjectFolder 1.0: short-time spectra for a unit force along x, y and z."""
 
-    Attributes:
-        rate_hz: samples per second.
-        samples: of a sound.
-        window: samples of a Hann window.
-        hop: samples between windows.
-        transform: samples of a transform; it has ``transform / 2 + 1`` frequencies.
-        frames: windows of a sound.
-        voxels: file of ``(m, 3)`` float64, the solid voxels whose spectra the network learnt.
-        grid: voxels along a side of the grid.
-        translation: added to a point in metres ...
-        scale: ... and multiplied by: then ``grid`` more are voxels.
-        bounds: of the voxels' coordinates, 0 and 1 of the network's; null where nobody gave them.
-        network: normalised place, frequency and time to the spectrum's real and imaginary part.
-    """
-
-    rate_hz: Positive = 16000.0
-    samples: Size = 32000
-    window: Size = 400
-    hop: Size = 160
-    transform: Size = 512
-    frames: Size = 201
-    voxels: FileEntry
-    grid: Size = 32
-    translation: Point
-    scale: Positive
+    rate_hz: Positive = 16000.0  #: samples per second.
+    samples: Size = 32000  #: of a sound.
+    window: Size = 400  #: samples of a Hann window.
+    hop: Size = 160  #: samples between windows.
+    transform: Size = 512  #: samples of a transform; it has ``transform / 2 + 1`` frequencies.
+    frames: Size = 201  #: windows of a sound.
+    voxels: FileEntry  #: file of ``(m, 3)`` float64, the solid voxels whose spectra the network learnt.
+    grid: Size = 32  #: voxels along a side of the grid.
+    translation: Point  #: added to a point in metres ...
+    scale: Positive  #: ... and multiplied by: then ``grid`` more are voxels.
     bounds: Bounds | None = None
-    network: NetworkEntry
+    """of the voxels' coordinates, 0 and 1 of the network's; null where nobody gave them."""
+    network: NetworkEntry  #: normalised place, frequency and time to the spectrum's real and imaginary part.
 
 
 class PublishedDepthEntry(Entry):
-    """Touch of ObjectFolder 2.0: the distance from the gel's camera to its surface.
+    """Touch of ObjectFolder 2.0: the distance from the gel's camera to its surface."""
 
-    Attributes:
-        rows: pixels.
-        columns: pixels.
-        low_m: m, least corner of the box that contacts may lie in.
-        high_m: m, greatest corner.
-        most_tilt_rad: rad, of the gel from the vertex's normal, at most.
-        depth_m: m, least and greatest depth of a press.
-        network: nine numbers of a pixel to metres from the camera.
-    """
-
-    rows: Size = 120
-    columns: Size = 160
-    low_m: Point
-    high_m: Point
-    most_tilt_rad: Positive
-    depth_m: tuple[Positive, Positive]
-    network: NetworkEntry
+    rows: Size = 120  #: pixels.
+    columns: Size = 160  #: pixels.
+    low_m: Point  #: m, least corner of the box that contacts may lie in.
+    high_m: Point  #: m, greatest corner.
+    most_tilt_rad: Positive  #: rad, of the gel from the vertex's normal, at most.
+    depth_m: tuple[Positive, Positive]  #: m, least and greatest depth of a press.
+    network: NetworkEntry  #: nine numbers of a pixel to metres from the camera.
 
 
 class PublishedColoursEntry(Entry):
-    """Touch of ObjectFolder 1.0: what a DIGIT sees of a press along the normal.
+    """Touch of ObjectFolder 1.0: what a DIGIT sees of a press along the normal."""
 
-    Attributes:
-        rows: pixels.
-        columns: pixels.
-        bounds_m: m, least and greatest coordinate (x, y and z alike) of what the network learnt from; null
-            where nobody gave them.
-        network: normalised place, row and column to red, green and blue, -1 to 1.
-    """
-
-    rows: Size = 160
-    columns: Size = 120
+    rows: Size = 160  #: pixels.
+    columns: Size = 120  #: pixels.
     bounds_m: Bounds | None = None
-    network: NetworkEntry
+    """m, least and greatest coordinate (x, y and z alike) of what the network learnt from; null where nobody
+    gave them."""
+    network: NetworkEntry  #: normalised place, row and column to red, green and blue, -1 to 1.
 
 
 class PublishedCellsEntry(Entry):
-    """The cells of a KiloOSF: a lattice over a cube, a network in each that matter may be in.
+    """The cells of a KiloOSF: a lattice over a cube, a network in each that matter may be in."""
 
-    Attributes:
-        low: least corner of the cube.
-        high: greatest corner.
-        cells: along x, y and z.
-        block: samples of one network that are queried together.
-        networks: file of ``(x y z,)`` int32: the network of each cell, x slowest; -1 where there is none.
-        occupancy: file of packed bits, x slowest, the first voxel in the highest bit; null where all is taken
-            for occupied.
-        voxels: of the occupancy, along x, y and z.
-    """
-
-    low: Point
-    high: Point
-    cells: tuple[Size, Size, Size]
-    block: Size
+    low: Point  #: least corner of the cube.
+    high: Point  #: greatest corner.
+    cells: tuple[Size, Size, Size]  #: along x, y and z.
+    block: Size  #: samples of one network that are queried together.
     networks: FileEntry
+    """file of ``(x y z,)`` int32: the network of each cell, x slowest; -1 where there is none."""
     occupancy: FileEntry | None = None
-    voxels: tuple[Size, Size, Size] | None = None
+    """file of packed bits, x slowest, the first voxel in the highest bit; null where all is taken for
+    occupied."""
+    voxels: tuple[Size, Size, Size] | None = None  #: of the occupancy, along x, y and z.
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -153,32 +109,21 @@ class PublishedVisionEntry(Entry):
     """Look of either: raw colour and density in a normalised frame, summed along rays.
 
     Lengths are in the frame's own unit. What it is in metres, and how it lies to the mesh, is not published.
-
-    Attributes:
-        kind: ``osf`` one network for all places; ``kilo-osf`` one for each cell.
-        frame: of points, views and light.
-        near: along the camera's axis, the first sample.
-        far: along the camera's axis, the last sample.
-        samples: along a ray.
-        importance: further samples, placed by the weights of the first; 0 for none.
-        white: whether the background is white; else it is black.
-        colour: how raw colour becomes colour before it is stretched by 1.2 about 0.5.
-        network: the only one, or the coarse one.
-        fine: takes the further samples; null where there are none.
-        cells: of ``kilo-osf``.
     """
 
-    kind: Literal["osf", "kilo-osf"]
-    frame: Literal["vision: normalised, z up"] = "vision: normalised, z up"
-    near: Positive
-    far: Positive
-    samples: Annotated[int, Field(ge=2, le=4096)]
+    kind: Literal["osf", "kilo-osf"]  #: ``osf`` one network for all places; ``kilo-osf`` one for each cell.
+    frame: Literal["vision: normalised, z up"] = "vision: normalised, z up"  #: of points, views and light.
+    near: Positive  #: along the camera's axis, the first sample.
+    far: Positive  #: along the camera's axis, the last sample.
+    samples: Annotated[int, Field(ge=2, le=4096)]  #: along a ray.
     importance: Annotated[int, Field(ge=0, le=4096)]
-    white: bool
+    """further samples, placed by the weights of the first; 0 for none."""
+    white: bool  #: whether the background is white; else it is black.
     colour: Literal["sigmoid", "clipped"]
-    network: NetworkEntry
-    fine: NetworkEntry | None = None
-    cells: PublishedCellsEntry | None = None
+    """how raw colour becomes colour before it is stretched by 1.2 about 0.5."""
+    network: NetworkEntry  #: the only one, or the coarse one.
+    fine: NetworkEntry | None = None  #: takes the further samples; null where there are none.
+    cells: PublishedCellsEntry | None = None  #: of ``kilo-osf``.
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -192,35 +137,22 @@ class PublishedVisionEntry(Entry):
 
 
 class PublishedDescription(Entry):
-    """All of an imported ``object.json``.
+    """All of an imported ``object.json``."""
 
-    Attributes:
-        schema_number: ``schema`` in the file.
-        kind: that it is of networks imported from a published file, not built from a mesh.
-        name: of the object.
-        format: of the published file.
-        missing: what the file does not hold and a user may expect, a sentence each.
-        dropped: numbers of the file that its own program never uses, by name.
-        provenance: file, hash, licence.
-        audio_gains: sound of 2.0.
-        audio_spectrum: sound of 1.0.
-        touch_depth: touch of 2.0.
-        touch_colours: touch of 1.0.
-        vision: look of either.
-    """
-
-    schema_number: Literal[1] = Field(alias="schema")
+    schema_number: Literal[1] = Field(alias="schema")  #: ``schema`` in the file.
     kind: Literal["published"]
-    name: Annotated[str, Field(min_length=1, max_length=200)]
-    format: Format
-    missing: tuple[str, ...]
+    """that it is of networks imported from a published file, not built from a mesh."""
+    name: Annotated[str, Field(min_length=1, max_length=200)]  #: of the object.
+    format: Format  #: of the published file.
+    missing: tuple[str, ...]  #: what the file does not hold and a user may expect, a sentence each.
     dropped: dict[str, int] = Field(default_factory=dict)
-    provenance: Provenance
-    audio_gains: PublishedGainsEntry | None = None
-    audio_spectrum: PublishedSpectrumEntry | None = None
-    touch_depth: PublishedDepthEntry | None = None
-    touch_colours: PublishedColoursEntry | None = None
-    vision: PublishedVisionEntry | None = None
+    """numbers of the file that its own program never uses, by name."""
+    provenance: Provenance  #: file, hash, licence.
+    audio_gains: PublishedGainsEntry | None = None  #: sound of 2.0.
+    audio_spectrum: PublishedSpectrumEntry | None = None  #: sound of 1.0.
+    touch_depth: PublishedDepthEntry | None = None  #: touch of 2.0.
+    touch_colours: PublishedColoursEntry | None = None  #: touch of 1.0.
+    vision: PublishedVisionEntry | None = None  #: look of either.
 
     @property
     def networks(self) -> dict[str, NetworkEntry]:

@@ -15,15 +15,10 @@ from harness.objects.builtin import DESCRIPTION
 
 @dataclass(frozen=True, eq=False)
 class PublishedObject:
-    """An object whose networks were published by others.
+    """An object whose networks were published by others."""
 
-    Attributes:
-        folder: it lies in.
-        description: what its ``object.json`` says.
-    """
-
-    folder: Path
-    description: PublishedDescription
+    folder: Path  #: it lies in.
+    description: PublishedDescription  #: what its ``object.json`` says.
 
     @classmethod
     def open(cls, folder: Path) -> "PublishedObject":

@@ -73,19 +73,12 @@ class OsfNetwork:
 
 @dataclass(frozen=True, eq=False)
 class CellNetworks:
-    """One network for each cell (KiloOSF).
+    """One network for each cell (KiloOSF)."""
 
-    Attributes:
-        entry: description of the cells.
-        network: all cells' networks in one graph, queried in blocks.
-        networks: ``(cells,)`` number of each cell's network, -1 for none.
-        occupied: ``(voxels,)``; None if all of the cube counts as occupied.
-    """
-
-    entry: PublishedCellsEntry
-    network: Network
-    networks: IntArray
-    occupied: BoolArray | None
+    entry: PublishedCellsEntry  #: description of the cells.
+    network: Network  #: all cells' networks in one graph, queried in blocks.
+    networks: IntArray  #: ``(cells,)`` number of each cell's network, -1 for none.
+    occupied: BoolArray | None  #: ``(voxels,)``; None if all of the cube counts as occupied.
 
     def raw(self, points: FloatArray, views: FloatArray, light: FloatArray) -> FloatArray:
         """Compute raw red, green, blue and density, as ``OsfNetwork.raw``."""
@@ -143,15 +136,10 @@ def blocks(networks: IntArray, size: int) -> tuple[IntArray, IntArray]:
 
 @dataclass(frozen=True, eq=False)
 class PublishedPicture:
-    """A picture, before it is rounded.
+    """A picture, before it is rounded."""
 
-    Attributes:
-        colour: ``(size, size, 3)``, of which 0 is black and 1 white; it may lie beyond.
-        cover: ``(size, size)`` share of each pixel that is covered.
-    """
-
-    colour: FloatArray
-    cover: FloatArray
+    colour: FloatArray  #: ``(size, size, 3)``, of which 0 is black and 1 white; it may lie beyond.
+    cover: FloatArray  #: ``(size, size)`` share of each pixel that is covered.
 
     def rounded(self) -> ByteArray:
         """``(size, size, 3)`` to the nearest of 256 greys."""
@@ -164,17 +152,11 @@ class PublishedPicture:
 
 @dataclass(frozen=True, eq=False)
 class PublishedLook:
-    """The networks of an imported look.
+    """The networks of an imported look."""
 
-    Attributes:
-        entry: description of the look, with how rays are sampled.
-        coarse: the only network, or that of the first samples.
-        fine: network of all samples; None if there are no further ones.
-    """
-
-    entry: PublishedVisionEntry
-    coarse: OsfNetwork | CellNetworks
-    fine: OsfNetwork | None = None
+    entry: PublishedVisionEntry  #: description of the look, with how rays are sampled.
+    coarse: OsfNetwork | CellNetworks  #: the only network, or that of the first samples.
+    fine: OsfNetwork | None = None  #: network of all samples; None if there are no further ones.
 
     def picture(self, view: PublishedView, size: int, offset: float) -> PublishedPicture:
         """Render a view.

@@ -36,15 +36,10 @@ NEAREST = 4
 
 @dataclass(frozen=True, eq=False)
 class PublishedGains:
-    """The network of an imported sound, and its modes.
+    """The network of an imported sound, and its modes."""
 
-    Attributes:
-        entry: what is said of it.
-        network: points to gains.
-    """
-
-    entry: PublishedGainsEntry
-    network: Network
+    entry: PublishedGainsEntry  #: what is said of it.
+    network: Network  #: points to gains.
 
     @property
     def frequencies(self) -> FloatArray:
@@ -141,17 +136,11 @@ def peak_normalised(sounds: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class PublishedSpectra:
-    """The network of an imported sound of version 1.0.
+    """The network of an imported sound of version 1.0."""
 
-    Attributes:
-        entry: what is said of it.
-        voxels: ``(m, 3)``, in voxels.
-        network: normalised place, frequency and time to the spectrum.
-    """
-
-    entry: PublishedSpectrumEntry
-    voxels: FloatArray
-    network: Network
+    entry: PublishedSpectrumEntry  #: what is said of it.
+    voxels: FloatArray  #: ``(m, 3)``, in voxels.
+    network: Network  #: normalised place, frequency and time to the spectrum.
 
     def near(self, point: FloatArray) -> FloatArray:
         """``(4, 3)``: the voxels nearest to a ``(3,)`` point in metres, in the mesh's frame."""

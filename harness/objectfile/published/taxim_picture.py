@@ -27,17 +27,12 @@ _KERNELS = (11, 5)
 
 @dataclass(frozen=True, eq=False)
 class TaximPicture:
-    """A published calibration made ready.
+    """A published calibration made ready."""
 
-    Attributes:
-        table: ``(bins, bins, 6, 3)`` RGB.
-        rest: ``(rows, columns)`` pixels, the untouched gel towards the camera.
-        base: ``(rows, columns, 3)`` RGB: the untouched gel's picture less what the table says of its dome.
-    """
-
-    table: FloatArray
-    rest: FloatArray
+    table: FloatArray  #: ``(bins, bins, 6, 3)`` RGB.
+    rest: FloatArray  #: ``(rows, columns)`` pixels, the untouched gel towards the camera.
     base: FloatArray
+    """``(rows, columns, 3)`` RGB: the untouched gel's picture less what the table says of its dome."""
 
     @classmethod
     def open(cls, folder: Path, shape: tuple[int, int]) -> "TaximPicture":

@@ -32,15 +32,10 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class PublishedDepths:
-    """The network of an imported touch of version 2.0.
+    """The network of an imported touch of version 2.0."""
 
-    Attributes:
-        entry: what is said of it.
-        network: nine numbers of a pixel to metres.
-    """
-
-    entry: PublishedDepthEntry
-    network: Network
+    entry: PublishedDepthEntry  #: what is said of it.
+    network: Network  #: nine numbers of a pixel to metres.
 
     def maps(self, vertices: FloatArray, gel: FloatArray) -> FloatArray:
         """``(n, rows, columns)`` m from the gel's camera to its surface.
@@ -69,15 +64,10 @@ class PublishedDepths:
 
 @dataclass(frozen=True, eq=False)
 class PublishedColours:
-    """The network of an imported touch of version 1.0.
+    """The network of an imported touch of version 1.0."""
 
-    Attributes:
-        entry: what is said of it.
-        network: normalised place and pixel to colour.
-    """
-
-    entry: PublishedColoursEntry
-    network: Network
+    entry: PublishedColoursEntry  #: what is said of it.
+    network: Network  #: normalised place and pixel to colour.
 
     def bounds_of(self, vertices: FloatArray, of_query: bool) -> Bounds:
         """m: the least and greatest coordinate that places are normalised by.

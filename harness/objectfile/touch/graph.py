@@ -47,24 +47,16 @@ class PatchCodes:
 
     Pixel (i, j) of a patch is the place x = (j + 0.5 - size / 2) pitch, y = (i + 0.5 - size / 2) pitch
     of the node's frame, whose z axis points into the object.
-
-    Attributes:
-        codes: ``(nodes, k)`` m.
-        basis: ``(k, pixels)``, of the pixels inside; None where a code is the pixels themselves.
-        mean: ``(pixels,)`` m, which is added.
-        cover: ``(nodes, pixels)`` uint8, the share of a pixel that is surface in reach, times 255.
-        inside: ``(size, size)``: the pixels that a code says something of.
-        outside: m, the height of all others: out of any gel's reach.
-        pitch: m.
     """
 
-    codes: FloatArray
+    codes: FloatArray  #: ``(nodes, k)`` m.
     basis: FloatArray | None
-    mean: FloatArray
-    cover: ByteArray
-    inside: BoolArray
-    outside: float
-    pitch: float
+    """``(k, pixels)``, of the pixels inside; None where a code is the pixels themselves."""
+    mean: FloatArray  #: ``(pixels,)`` m, which is added.
+    cover: ByteArray  #: ``(nodes, pixels)`` uint8, the share of a pixel that is surface in reach, times 255.
+    inside: BoolArray  #: ``(size, size)``: the pixels that a code says something of.
+    outside: float  #: m, the height of all others: out of any gel's reach.
+    pitch: float  #: m.
 
     def heights(self, node: int) -> FloatArray:
         """``(size, size)`` m, as the graph takes them to be."""

@@ -17,15 +17,10 @@ BEND = 20e-3
 
 @dataclass(frozen=True, eq=False)
 class SurfaceNodes:
-    """Places of a surface, no two alike.
+    """Places of a surface, no two alike."""
 
-    Attributes:
-        points: ``(n, 3)`` m, in the object's frame.
-        normals: ``(n, 3)`` unit, outward, of the face.
-    """
-
-    points: FloatArray
-    normals: FloatArray
+    points: FloatArray  #: ``(n, 3)`` m, in the object's frame.
+    normals: FloatArray  #: ``(n, 3)`` unit, outward, of the face.
 
     def __len__(self) -> int:
         return len(self.points)

@@ -31,61 +31,36 @@ _TOLERANCE = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class CodesPart:
-    """Codes to be written.
+    """Codes to be written."""
 
-    Attributes:
-        graph: ``touch_graph.codes_graph``.
-        nodes: the places of the codes.
-        most_off: m, of ``touch_nodes.signatures``, that a press may be from its node.
-        measured: its errors, by a name with its unit.
-    """
-
-    graph: ModelProto
-    nodes: SurfaceNodes
-    most_off: float
-    measured: Mapping[str, float] = field(default_factory=dict)
+    graph: ModelProto  #: ``touch_graph.codes_graph``.
+    nodes: SurfaceNodes  #: the places of the codes.
+    most_off: float  #: m, of ``touch_nodes.signatures``, that a press may be from its node.
+    measured: Mapping[str, float] = field(default_factory=dict)  #: its errors, by a name with its unit.
 
 
 @dataclass(frozen=True, eq=False)
 class PerceptronPart:
-    """The paper's network to be written.
+    """The paper's network to be written."""
 
-    Attributes:
-        graph: ``touch_perceptron.perceptron_graph``.
-        least: ``(9,)`` of each input (``touch_perceptron.pixel_domain``).
-        most: ``(9,)``.
-        measured: its errors, by a name with its unit.
-    """
-
-    graph: ModelProto
-    least: FloatArray
-    most: FloatArray
-    measured: Mapping[str, float] = field(default_factory=dict)
+    graph: ModelProto  #: ``touch_perceptron.perceptron_graph``.
+    least: FloatArray  #: ``(9,)`` of each input (``touch_perceptron.pixel_domain``).
+    most: FloatArray  #: ``(9,)``.
+    measured: Mapping[str, float] = field(default_factory=dict)  #: its errors, by a name with its unit.
 
 
 @dataclass(frozen=True, eq=False)
 class TouchPart:
-    """A touch to be written.
+    """A touch to be written."""
 
-    Attributes:
-        sensor: a flat gel.
-        skirt: of the gel.
-        depths: m, least and greatest that may be asked.
-        most_tilt: rad.
-        near_surface: m, the farthest from the surface that a press may be.
-        provenance: of the touch.
-        codes: one level; None for the other alone.
-        perceptron: the other.
-    """
-
-    sensor: TactileSensor
-    skirt: GelSkirt
-    depths: tuple[float, float]
-    most_tilt: float
-    near_surface: float
-    provenance: Provenance
-    codes: CodesPart | None = None
-    perceptron: PerceptronPart | None = None
+    sensor: TactileSensor  #: a flat gel.
+    skirt: GelSkirt  #: of the gel.
+    depths: tuple[float, float]  #: m, least and greatest that may be asked.
+    most_tilt: float  #: rad.
+    near_surface: float  #: m, the farthest from the surface that a press may be.
+    provenance: Provenance  #: of the touch.
+    codes: CodesPart | None = None  #: one level; None for the other alone.
+    perceptron: PerceptronPart | None = None  #: the other.
 
 
 def with_touch(of: ObjectFile, part: TouchPart) -> ObjectFile:

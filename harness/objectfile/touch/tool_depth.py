@@ -44,23 +44,15 @@ _WHOLE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class CodedDepth:
-    """First surfaces along a tool, by codes.
+    """First surfaces along a tool, by codes."""
 
-    Attributes:
-        network: the graph of codes, for its ``gaps``.
-        nodes: where the codes belong.
-        gel: whose rays they are.
-        places: of tiles.
-        owners: ``(n,)`` node of each tile.
-        rms: m, that the codes' maps are off by as their card states it (``CodesEntry.stated_rms``).
-    """
-
-    network: Network
-    nodes: NodeSearch
-    gel: GelEntry
-    places: SurfaceNodes
-    owners: IntArray
+    network: Network  #: the graph of codes, for its ``gaps``.
+    nodes: NodeSearch  #: where the codes belong.
+    gel: GelEntry  #: whose rays they are.
+    places: SurfaceNodes  #: of tiles.
+    owners: IntArray  #: ``(n,)`` node of each tile.
     rms: float = 0.0
+    """m, that the codes' maps are off by as their card states it (``CodesEntry.stated_rms``)."""
 
     def __call__(self, view_from_object: FloatArray, pitch: float, rows: int, columns: int) -> FloatArray:
         """``(rows, columns)`` m along the view's z axis to the first surface; inf where there is none.

@@ -44,15 +44,10 @@ class Maps(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class CodeMaps:
-    """Maps from codes of the surface.
+    """Maps from codes of the surface."""
 
-    Attributes:
-        network: the graph of codes.
-        nodes: where the codes belong.
-    """
-
-    network: "Network"
-    nodes: NodeSearch
+    network: "Network"  #: the graph of codes.
+    nodes: NodeSearch  #: where the codes belong.
 
     def __call__(self, presses: Presses) -> AnyArray:
         """``(n, rows, columns)`` m; refuses a press that no code is near."""
@@ -97,19 +92,12 @@ class ReferenceMaps:
 
 @dataclass(frozen=True, eq=False)
 class ObjectTouch:
-    """What a gel shows when it is pressed onto one object.
+    """What a gel shows when it is pressed onto one object."""
 
-    Attributes:
-        level: where the maps come from.
-        entry: what ``object.json`` says: the gel, and what may be asked.
-        surface: the object's; presses are to be on it.
-        maps: of presses that were looked at.
-    """
-
-    level: TouchLevel
-    entry: TouchEntry
-    surface: SurfaceSearch
-    maps: Maps
+    level: TouchLevel  #: where the maps come from.
+    entry: TouchEntry  #: what ``object.json`` says: the gel, and what may be asked.
+    surface: SurfaceSearch  #: the object's; presses are to be on it.
+    maps: Maps  #: of presses that were looked at.
 
     @property
     def measured(self) -> Mapping[str, float]:

@@ -28,17 +28,11 @@ network beyond it knows nothing of this object."""
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was looked at.
+    """One thing that was looked at."""
 
-    Attributes:
-        name: of it.
-        passed: whether it holds.
-        said: what was found; where it does not hold, what to do.
-    """
-
-    name: str
-    passed: bool
-    said: str
+    name: str  #: of it.
+    passed: bool  #: whether it holds.
+    said: str  #: what was found; where it does not hold, what to do.
 
 
 def verify(of: ObjectFile) -> list[Check]:

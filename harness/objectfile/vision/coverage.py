@@ -24,21 +24,13 @@ NEAREST = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """A picture's pixels, those that show anything.
+    """A picture's pixels, those that show anything."""
 
-    Attributes:
-        pixels: ``(n,)`` counted row by row.
-        cover: ``(n,)`` float32: share of each that is covered.
-        places: ``(n, 2)`` float32 x and y, pixels: the covered place that is nearest to its centre.
-        depth: ``(n,)`` float32 m, there.
-        faces: ``(n,)`` int32, which face is in front there.
-    """
-
-    pixels: AnyArray
-    cover: AnyArray
-    places: AnyArray
-    depth: AnyArray
-    faces: AnyArray
+    pixels: AnyArray  #: ``(n,)`` counted row by row.
+    cover: AnyArray  #: ``(n,)`` float32: share of each that is covered.
+    places: AnyArray  #: ``(n, 2)`` float32 x and y, pixels: the covered place that is nearest to its centre.
+    depth: AnyArray  #: ``(n,)`` float32 m, there.
+    faces: AnyArray  #: ``(n,)`` int32, which face is in front there.
 
 
 @cache
@@ -120,22 +112,16 @@ EMPTY = 255
 
 @dataclass(frozen=True, eq=False)
 class Contours:
-    """Of a mesh: its faces' planes, and which faces meet along its edges.
+    """Of a mesh: its faces' planes, and which faces meet along its edges."""
 
-    Attributes:
-        mesh: in metres.
-        closed: whether it is, of ``is_closed``.
-        faces: ``(m, 3)`` uint32, the mesh's.
-        planes: ``(4, faces)``: normal of any length, outward, and its product with the face's places.
-        edges: ``(e, 4)`` int32: two vertices, the face that goes from the first to the second, and one that
-            goes back, or -1.
-    """
-
-    mesh: Mesh
-    closed: bool
-    faces: AnyArray
+    mesh: Mesh  #: in metres.
+    closed: bool  #: whether it is, of ``is_closed``.
+    faces: AnyArray  #: ``(m, 3)`` uint32, the mesh's.
     planes: FloatArray
+    """``(4, faces)``: normal of any length, outward, and its product with the face's places."""
     edges: AnyArray
+    """``(e, 4)`` int32: two vertices, the face that goes from the first to the second, and one that goes
+    back, or -1."""
 
     @classmethod
     def of(cls, mesh: Mesh) -> "Contours":

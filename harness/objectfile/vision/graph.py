@@ -54,17 +54,12 @@ _AT_ONCE = 128
 
 @dataclass(frozen=True, eq=False)
 class Answers:
-    """What networks answer of points of a surface.
-
-    Attributes:
-        known: ``(n,)`` whether a network is where the point is; what follows has no meaning where none is.
-        density: ``(n,)`` float32, 1/m.
-        scattered: ``(n, 3)`` float32, linear red, green and blue, 0 to 1.
-    """
+    """What networks answer of points of a surface."""
 
     known: BoolArray
-    density: AnyArray
-    scattered: AnyArray
+    """``(n,)`` whether a network is where the point is; what follows has no meaning where none is."""
+    density: AnyArray  #: ``(n,)`` float32, 1/m.
+    scattered: AnyArray  #: ``(n, 3)`` float32, linear red, green and blue, 0 to 1.
 
 
 class VisionNetworks:
@@ -189,19 +184,12 @@ def _size(held: Mapping[str, AnyArray], kind: Kind) -> NetworkSize:
 
 @dataclass
 class _Blocks:
-    """The graph under construction.
+    """The graph under construction."""
 
-    Attributes:
-        model: written.
-        nodes: so far.
-        names: of constants by theirs.
-        network: name of the flat input.
-    """
-
-    model: VisionModel
-    nodes: Nodes
-    names: dict[str, str]
-    network: str
+    model: VisionModel  #: written.
+    nodes: Nodes  #: so far.
+    names: dict[str, str]  #: of constants by theirs.
+    network: str  #: name of the flat input.
 
     def kept(self, name: str, array: AnyArray) -> str:
         """A constant that is read back by its name."""

@@ -34,19 +34,13 @@ Eye = tuple[FloatArray, float, float, float, FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class SurfacePoints:
-    """The points of a surface that rays meet, one a ray.
+    """The points of a surface that rays meet, one a ray."""
 
-    Attributes:
-        points: ``(n, 3)`` m, object frame.
-        views: ``(n, 3)`` float32 unit, from the camera.
-        light: ``(3,)`` float32 unit, towards the lamp.
-        extras: ``(n, 4)`` float32: 1 where the lamp is seen, else 0; the unit normal on the side seen.
-    """
-
-    points: FloatArray
-    views: AnyArray
-    light: AnyArray
+    points: FloatArray  #: ``(n, 3)`` m, object frame.
+    views: AnyArray  #: ``(n, 3)`` float32 unit, from the camera.
+    light: AnyArray  #: ``(3,)`` float32 unit, towards the lamp.
     extras: AnyArray
+    """``(n, 4)`` float32: 1 where the lamp is seen, else 0; the unit normal on the side seen."""
 
 
 class HitSurface:
@@ -185,33 +179,20 @@ Lists = tuple[
 
 @dataclass(frozen=True, eq=False)
 class LampGrid:
-    """The faces of a mesh as a lamp sees them.
-
-    Attributes:
-        turn: ``(3, 3)``: columns are two directions across the light, and the one towards the lamp.
-        low: ``(2,)`` m, least corner of the grid across the light.
-        cell: m, edge of a cell.
-        starts: ``(rows * columns + 1,)`` int32: where each cell's list begins.
-        most: ``(rows * columns,)`` m: how near to the lamp any face of a cell reaches.
-        listed: int32 faces.
-        tops: ``(listed,)`` m: how near to the lamp each listed one reaches.
-        turned: ``(n, 3)`` m, the mesh's vertices.
-        faces: ``(m, 3)`` the mesh's.
-        columns: cells along the second direction.
-        from_outside: whether only such faces are listed as look away from the lamp.
-    """
+    """The faces of a mesh as a lamp sees them."""
 
     turn: FloatArray
-    low: FloatArray
-    cell: float
-    starts: AnyArray
-    most: FloatArray
-    listed: AnyArray
-    tops: FloatArray
-    turned: FloatArray
-    faces: AnyArray
-    columns: int
-    from_outside: bool
+    """``(3, 3)``: columns are two directions across the light, and the one towards the lamp."""
+    low: FloatArray  #: ``(2,)`` m, least corner of the grid across the light.
+    cell: float  #: m, edge of a cell.
+    starts: AnyArray  #: ``(rows * columns + 1,)`` int32: where each cell's list begins.
+    most: FloatArray  #: ``(rows * columns,)`` m: how near to the lamp any face of a cell reaches.
+    listed: AnyArray  #: int32 faces.
+    tops: FloatArray  #: ``(listed,)`` m: how near to the lamp each listed one reaches.
+    turned: FloatArray  #: ``(n, 3)`` m, the mesh's vertices.
+    faces: AnyArray  #: ``(m, 3)`` the mesh's.
+    columns: int  #: cells along the second direction.
+    from_outside: bool  #: whether only such faces are listed as look away from the lamp.
 
     @classmethod
     def of(

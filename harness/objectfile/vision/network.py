@@ -43,19 +43,12 @@ _OUTSIDE = 0.125
 
 @dataclass(frozen=True)
 class NetworkSize:
-    """How large each tiny network is.
+    """How large each tiny network is."""
 
-    Attributes:
-        width: numbers of every hidden layer.
-        octaves: of a place's encoding: sines and cosines of 1, 2, 4, ... times the coordinate.
-        turns: octaves of a direction's.
-        kind: what it is told.
-    """
-
-    width: int = 64
-    octaves: int = 10
-    turns: int = 4
-    kind: Kind = "osf"
+    width: int = 64  #: numbers of every hidden layer.
+    octaves: int = 10  #: of a place's encoding: sines and cosines of 1, 2, 4, ... times the coordinate.
+    turns: int = 4  #: octaves of a direction's.
+    kind: Kind = "osf"  #: what it is told.
 
     def __post_init__(self) -> None:
         if self.width < 8 or self.width % 8 or self.width > 256:
@@ -122,17 +115,11 @@ SIZES = {"paper": PAPER, "compact": COMPACT}
 
 @dataclass(frozen=True, eq=False)
 class VisionGrid:
-    """Where each network answers: cubes of a lattice, those that hold some surface.
+    """Where each network answers: cubes of a lattice, those that hold some surface."""
 
-    Attributes:
-        low: ``(3,)`` m, least corner of the lattice, object frame.
-        cell: m, edge of every cube.
-        cells: ``(networks, 3)`` which cube each network has.
-    """
-
-    low: FloatArray
-    cell: float
-    cells: IntArray
+    low: FloatArray  #: ``(3,)`` m, least corner of the lattice, object frame.
+    cell: float  #: m, edge of every cube.
+    cells: IntArray  #: ``(networks, 3)`` which cube each network has.
 
     def __post_init__(self) -> None:
         low, cells = np.array(self.low, np.float64), np.array(self.cells, np.int64)
@@ -231,38 +218,22 @@ class VisionWeights:
 
     The rows of ``scatter`` are the feature's, the view's, the light's, the extras'. A view is the way from
     the camera into the picture, a light the way to the lamp, both unit, in the object's frame.
-
-    Attributes:
-        size: of each network.
-        density_scale: 1/m that a density of 1 stands for: keeps numbers within float16.
-        first: of a place's encoding.
-        first_bias: of it.
-        second: of what ``first`` gave.
-        second_bias: of it.
-        density: of what ``second`` gave, ReLU after it.
-        density_bias: of it.
-        feature: of what ``second`` gave.
-        feature_bias: of it.
-        scatter: of the feature and the directions.
-        scatter_bias: of it.
-        colour: of what ``scatter`` gave, a logistic after it.
-        colour_bias: of it.
     """
 
-    size: NetworkSize
-    density_scale: float
-    first: AnyArray
-    first_bias: AnyArray
-    second: AnyArray
-    second_bias: AnyArray
-    density: AnyArray
-    density_bias: AnyArray
-    feature: AnyArray
-    feature_bias: AnyArray
-    scatter: AnyArray
-    scatter_bias: AnyArray
-    colour: AnyArray
-    colour_bias: AnyArray
+    size: NetworkSize  #: of each network.
+    density_scale: float  #: 1/m that a density of 1 stands for: keeps numbers within float16.
+    first: AnyArray  #: of a place's encoding.
+    first_bias: AnyArray  #: of it.
+    second: AnyArray  #: of what ``first`` gave.
+    second_bias: AnyArray  #: of it.
+    density: AnyArray  #: of what ``second`` gave, ReLU after it.
+    density_bias: AnyArray  #: of it.
+    feature: AnyArray  #: of what ``second`` gave.
+    feature_bias: AnyArray  #: of it.
+    scatter: AnyArray  #: of the feature and the directions.
+    scatter_bias: AnyArray  #: of it.
+    colour: AnyArray  #: of what ``scatter`` gave, a logistic after it.
+    colour_bias: AnyArray  #: of it.
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.density_scale) and self.density_scale > 0.0):
@@ -297,15 +268,10 @@ class VisionWeights:
 
 @dataclass(frozen=True, eq=False)
 class VisionModel:
-    """Networks and where each answers.
+    """Networks and where each answers."""
 
-    Attributes:
-        grid: of the cells.
-        weights: as many networks as cells.
-    """
-
-    grid: VisionGrid
-    weights: VisionWeights
+    grid: VisionGrid  #: of the cells.
+    weights: VisionWeights  #: as many networks as cells.
 
     def __post_init__(self) -> None:
         if len(self.grid) != len(self.weights):

@@ -25,21 +25,14 @@ _TOLERANCE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class VisionPart:
-    """A look to be written.
+    """A look to be written."""
 
-    Attributes:
-        model: networks, and where each answers; kept as float16.
-        provenance: of the look.
-        measured: its errors, by a name with its unit.
-        surface: in metres, what pictures are drawn along; None where that is the object's mesh.
-        block: samples of one network that the graph is asked together.
-    """
-
-    model: VisionModel
-    provenance: Provenance
-    measured: Mapping[str, float] = field(default_factory=dict)
+    model: VisionModel  #: networks, and where each answers; kept as float16.
+    provenance: Provenance  #: of the look.
+    measured: Mapping[str, float] = field(default_factory=dict)  #: its errors, by a name with its unit.
     surface: Mesh | None = None
-    block: int = BLOCK
+    """in metres, what pictures are drawn along; None where that is the object's mesh."""
+    block: int = BLOCK  #: samples of one network that the graph is asked together.
 
 
 def with_vision(of: ObjectFile, part: VisionPart) -> ObjectFile:

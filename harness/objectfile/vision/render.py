@@ -38,16 +38,12 @@ REMOVED = {
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """Knobs of a picture, each of cost against error.
+    """Knobs of a picture, each of cost against error."""
 
-    Attributes:
-        coverage: sub-pixels along a pixel, of the mesh's outline.
-        rays: along a pixel, so that 2 are four of them. With one, the edge of a print or of a shadow within a
-            pixel is on this side or on that.
-    """
-
-    coverage: int = 3
+    coverage: int = 3  #: sub-pixels along a pixel, of the mesh's outline.
     rays: int = 1
+    """along a pixel, so that 2 are four of them. With one, the edge of a print or of a shadow within a pixel
+    is on this side or on that."""
 
     def __post_init__(self) -> None:
         if self.coverage not in COVERS:
@@ -58,19 +54,12 @@ class RenderSettings:
 
 @dataclass(frozen=True, eq=False)
 class Rendered:
-    """A picture and what it took.
+    """A picture and what it took."""
 
-    Attributes:
-        image: linear light, coverage and depth.
-        samples: that networks were asked for.
-        rays: of the pixels that show the object.
-        seconds: s of each part, and ``render`` of all.
-    """
-
-    image: LinearImage
-    samples: int
-    rays: int
-    seconds: Mapping[str, float]
+    image: LinearImage  #: linear light, coverage and depth.
+    samples: int  #: that networks were asked for.
+    rays: int  #: of the pixels that show the object.
+    seconds: Mapping[str, float]  #: s of each part, and ``render`` of all.
 
 
 class VisionRenderer:
@@ -148,16 +137,12 @@ def _picture(camera: Pinhole, outline: Outline, found: Answers, light: Direction
 
 
 class ObjectVision:
-    """The look of one object; one picture at a time.
-
-    Attributes:
-        entry: its table in ``object.json``.
-        surface: in metres, along which pictures are rendered.
-        renderer: of the networks.
-    """
+    """The look of one object; one picture at a time."""
 
     def __init__(self, entry: VisionEntry, surface: Mesh, renderer: VisionRenderer) -> None:
-        self.entry, self.surface, self.renderer = entry, surface, renderer
+        self.entry = entry  #: its table in ``object.json``.
+        self.surface = surface  #: in metres, along which pictures are rendered.
+        self.renderer = renderer  #: of the networks.
 
     def picture(
         self, camera: Pinhole, light: DirectionalLight, settings: RenderSettings | None = None

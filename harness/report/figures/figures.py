@@ -18,15 +18,10 @@ from harness.report.figures.style import styled
 
 @dataclass(frozen=True)
 class Picture:
-    """A drawn picture.
+    """A drawn picture."""
 
-    Attributes:
-        source: a ``data:`` address that holds all of it.
-        file: name of the PNG beside the page.
-    """
-
-    source: str
-    file: str
+    source: str  #: a ``data:`` address that holds all of it.
+    file: str  #: name of the PNG beside the page.
 
 
 class Album:

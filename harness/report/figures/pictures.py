@@ -39,15 +39,10 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """The object seen from the side of the answer and from the opposite one.
+    """The object seen from the side of the answer and from the opposite one."""
 
-    Attributes:
-        shots: the two views.
-        size: metres, diagonal of the object's box.
-    """
-
-    shots: tuple[Shot, Shot]
-    size: float
+    shots: tuple[Shot, Shot]  #: the two views.
+    size: float  #: metres, diagonal of the object's box.
 
 
 def object_sides(mesh: Mesh, towards: FloatArray, pixels: int) -> Sides:

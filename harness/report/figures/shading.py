@@ -74,19 +74,12 @@ class Shot:
 
 @dataclass(frozen=True, eq=False)
 class CameraPicture:
-    """What a camera sees, pixel by pixel.
+    """What a camera sees, pixel by pixel."""
 
-    Attributes:
-        camera: that saw it.
-        depth: ``(rows, columns)`` metres; +inf where nothing is.
-        part: index of the body, -1 where nothing is.
-        face: index of that body's face.
-    """
-
-    camera: Pinhole
-    depth: FloatArray
-    part: IntArray
-    face: IntArray
+    camera: Pinhole  #: that saw it.
+    depth: FloatArray  #: ``(rows, columns)`` metres; +inf where nothing is.
+    part: IntArray  #: index of the body, -1 where nothing is.
+    face: IntArray  #: index of that body's face.
 
 
 def _normals(

@@ -32,19 +32,12 @@ _MARGIN = 0.04
 
 @dataclass(frozen=True, eq=False)
 class KnownSurface:
-    """A surface, how well it is known, and what is known of it; m, z up.
+    """A surface, how well it is known, and what is known of it; m, z up."""
 
-    Attributes:
-        mesh: the surface.
-        deviation: ``(vertices,)`` m, one standard deviation along the normal.
-        contacts: ``(n, 3)`` m, the middle of each contact.
-        passed: ``(2, 3)`` m each: ways of the gel that met nothing, from and to.
-    """
-
-    mesh: Mesh
-    deviation: FloatArray
-    contacts: FloatArray
-    passed: Sequence[FloatArray]
+    mesh: Mesh  #: the surface.
+    deviation: FloatArray  #: ``(vertices,)`` m, one standard deviation along the normal.
+    contacts: FloatArray  #: ``(n, 3)`` m, the middle of each contact.
+    passed: Sequence[FloatArray]  #: ``(2, 3)`` m each: ways of the gel that met nothing, from and to.
 
 
 def surface_figure(shown: KnownSurface) -> Figure:
@@ -160,17 +153,11 @@ def mask_figure(picture: ByteArray, mask: BoolArray) -> Figure:
 
 @dataclass(frozen=True, eq=False)
 class SurfaceThen:
-    """A surface as it was known at some time of a run.
+    """A surface as it was known at some time of a run."""
 
-    Attributes:
-        title: when.
-        words: how well it was known, or why it was not.
-        shown: None where there was none.
-    """
-
-    title: str
-    words: str
-    shown: KnownSurface | None
+    title: str  #: when.
+    words: str  #: how well it was known, or why it was not.
+    shown: KnownSurface | None  #: None where there was none.
 
 
 def strip_figure(found: Sequence[SurfaceThen]) -> Figure:

@@ -17,32 +17,20 @@ _CLOSE = 0.15
 
 @dataclass(frozen=True, eq=False)
 class Resonances:
-    """What was heard beside what the model would sound like at the size found.
+    """What was heard beside what the model would sound like at the size found."""
 
-    Attributes:
-        heard: ``(p, 2)`` Hz and dB re 1 Pa/N.
-        modelled: ``(m, 2)`` likewise.
-        band: Hz, from and to, that the strikes excited.
-    """
-
-    heard: FloatArray
-    modelled: FloatArray
-    band: tuple[float, float]
+    heard: FloatArray  #: ``(p, 2)`` Hz and dB re 1 Pa/N.
+    modelled: FloatArray  #: ``(m, 2)`` likewise.
+    band: tuple[float, float]  #: Hz, from and to, that the strikes excited.
 
 
 @dataclass(frozen=True, eq=False)
 class TouchedObject:
-    """The object as large as it was found, and where it was met.
+    """The object as large as it was found, and where it was met."""
 
-    Attributes:
-        surface: ``(n, 3)`` m, samples of it, upright.
-        contacts: ``(c, 3)`` m, the middle of each.
-        passed: ``(n, 3)`` m each: ways of the gel that met nothing.
-    """
-
-    surface: FloatArray
-    contacts: FloatArray
-    passed: Sequence[FloatArray]
+    surface: FloatArray  #: ``(n, 3)`` m, samples of it, upright.
+    contacts: FloatArray  #: ``(c, 3)`` m, the middle of each.
+    passed: Sequence[FloatArray]  #: ``(n, 3)`` m each: ways of the gel that met nothing.
 
 
 def beliefs_figure(

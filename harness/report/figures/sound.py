@@ -163,29 +163,18 @@ def _believed(axes: Axes, shot: Shot, found: Posterior | Missing, truth: FloatAr
 
 @dataclass(frozen=True, eq=False)
 class ShownStrike:
-    """What the picture shows.
+    """What the picture shows."""
 
-    Attributes:
-        title: above it.
-        mesh: m, in the object's frame.
-        place: ``(3,)`` m, that was struck.
-        sound: ``(t,)`` in any unit.
-        rate: samples per second.
-        frequencies: ``(m,)`` Hz, of the modes that are heard, ascending.
-        dampings: ``(m,)`` 1/s.
-        amplitudes: ``(m,)`` of each mode in the sound, not all zero.
-        pushes: ``(f, 3, k)``: what a push into each face gives the lowest ``k`` of the modes, at its corners.
-    """
-
-    title: str
-    mesh: Mesh
-    place: FloatArray
-    sound: FloatArray
-    rate: float
-    frequencies: FloatArray
-    dampings: FloatArray
-    amplitudes: FloatArray
+    title: str  #: above it.
+    mesh: Mesh  #: m, in the object's frame.
+    place: FloatArray  #: ``(3,)`` m, that was struck.
+    sound: FloatArray  #: ``(t,)`` in any unit.
+    rate: float  #: samples per second.
+    frequencies: FloatArray  #: ``(m,)`` Hz, of the modes that are heard, ascending.
+    dampings: FloatArray  #: ``(m,)`` 1/s.
+    amplitudes: FloatArray  #: ``(m,)`` of each mode in the sound, not all zero.
     pushes: FloatArray
+    """``(f, 3, k)``: what a push into each face gives the lowest ``k`` of the modes, at its corners."""
 
 
 @dataclass(frozen=True)

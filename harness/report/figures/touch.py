@@ -18,24 +18,16 @@ _DEPTH_WIDTH, _DEPTH_TITLES = 3.8, 0.7
 
 @dataclass(frozen=True, eq=False)
 class TouchPictures:
-    """What is shown of a press.
+    """What is shown of a press."""
 
-    Attributes:
-        heights: ``(rows, columns)`` metres of indentation.
-        image: ``(rows, columns, 3)`` RGB, simulated.
-        background: the same of the untouched gel.
-        live: the same, seen by a camera; None without.
-        pitch: metres a pixel.
-        words: under the height map, the picture, its change, the live picture, live against simulated, live
-            against the background.
-    """
-
-    heights: FloatArray
-    image: ByteArray
-    background: ByteArray
-    live: ByteArray | None
-    pitch: float
+    heights: FloatArray  #: ``(rows, columns)`` metres of indentation.
+    image: ByteArray  #: ``(rows, columns, 3)`` RGB, simulated.
+    background: ByteArray  #: the same of the untouched gel.
+    live: ByteArray | None  #: the same, seen by a camera; None without.
+    pitch: float  #: metres a pixel.
     words: tuple[str, ...]
+    """under the height map, the picture, its change, the live picture, live against simulated, live against
+    the background."""
 
 
 def touch_figure(shown: TouchPictures) -> Figure:
@@ -66,25 +58,16 @@ def touch_figure(shown: TouchPictures) -> Figure:
 
 @dataclass(frozen=True, eq=False)
 class LevelPictures:
-    """A press by one level of an object's touch, beside the rasteriser's.
+    """A press by one level of an object's touch, beside the rasteriser's."""
 
-    Attributes:
-        level: its name.
-        heights: ``(rows, columns)`` metres of indentation of the gel.
-        image: ``(rows, columns, 3)`` RGB.
-        background: the same of the untouched gel.
-        reference: heights and picture by the rasteriser; None where that is the level.
-        pitch: metres a pixel.
-        words: under the height map, and under the differences.
-    """
-
-    level: str
-    heights: FloatArray
-    image: ByteArray
-    background: ByteArray
+    level: str  #: its name.
+    heights: FloatArray  #: ``(rows, columns)`` metres of indentation of the gel.
+    image: ByteArray  #: ``(rows, columns, 3)`` RGB.
+    background: ByteArray  #: the same of the untouched gel.
     reference: tuple[FloatArray, ByteArray] | None
-    pitch: float
-    words: tuple[str, str]
+    """heights and picture by the rasteriser; None where that is the level."""
+    pitch: float  #: metres a pixel.
+    words: tuple[str, str]  #: under the height map, and under the differences.
 
 
 def levels_figure(shown: LevelPictures) -> Figure:

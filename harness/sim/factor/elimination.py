@@ -26,22 +26,14 @@ class Elimination(NamedTuple):
 
     Supernode ``s`` eliminates the unknowns ``firsts[s]`` to ``firsts[s + 1]`` of the new order;
     below them its columns fill the rows ``rows[starts[s] : starts[s + 1]]``, ascending.
-
-    Attributes:
-        order: ``(u,)``, the old number of each new one.
-        rank: ``(u,)``, the new number of each old one.
-        firsts: ``(s + 1,)``.
-        starts: ``(s + 1,)``.
-        rows: new numbers.
-        children: ``(s,)``: how many supernodes hand what is left of theirs to this one.
     """
 
-    order: IntArray
-    rank: IntArray
-    firsts: IntArray
-    starts: IntArray
-    rows: IntArray
-    children: IntArray
+    order: IntArray  #: ``(u,)``, the old number of each new one.
+    rank: IntArray  #: ``(u,)``, the new number of each old one.
+    firsts: IntArray  #: ``(s + 1,)``.
+    starts: IntArray  #: ``(s + 1,)``.
+    rows: IntArray  #: new numbers.
+    children: IntArray  #: ``(s,)``: how many supernodes hand what is left of theirs to this one.
 
     @property
     def widths(self) -> IntArray:

@@ -43,16 +43,12 @@ _variable: Any = cgutils.alloca_once
 
 @dataclass(frozen=True, eq=False)
 class Pivots:
-    """What the elimination of a symmetric matrix says of its eigenvalues.
+    """What the elimination of a symmetric matrix says of its eigenvalues."""
 
-    Attributes:
-        values: ``(u,)`` diagonal of ``D``, in the plan's order.
-        growth: the largest ``sum_j L_ij^2 |d_j| / |A_ii|``, by which the matrix that was in fact
-            factorised may be further from the given one than rounding; 1 for a positive definite one.
-    """
-
-    values: FloatArray
+    values: FloatArray  #: ``(u,)`` diagonal of ``D``, in the plan's order.
     growth: float
+    """the largest ``sum_j L_ij^2 |d_j| / |A_ii|``, by which the matrix that was in fact factorised may be
+    further from the given one than rounding; 1 for a positive definite one."""
 
     @property
     def negative(self) -> int:
@@ -62,17 +58,11 @@ class Pivots:
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """The factors of one matrix.
+    """The factors of one matrix."""
 
-    Attributes:
-        plan: of the elimination.
-        panels: the columns of ``L``, supernode by supernode.
-        pivots: ``D``.
-    """
-
-    plan: Elimination
-    panels: FloatArray
-    pivots: Pivots
+    plan: Elimination  #: of the elimination.
+    panels: FloatArray  #: the columns of ``L``, supernode by supernode.
+    pivots: Pivots  #: ``D``.
 
     def solve(self, block: FloatArray) -> FloatArray:
         """``(u, b)``: what the matrix turns into ``block``, ``(u, b)`` float64.

@@ -47,18 +47,13 @@ _MOST_TURNS = 1000
 
 @dataclass(frozen=True, eq=False)
 class Pressure:
-    """What presses where.
+    """What presses where."""
 
-    Attributes:
-        pascals: of every square, 0 where nothing presses.
-        left: share of the energy by which the search ended short of the least; ``SETTLED`` or less where it
-            settled.
-        turns: of the search.
-    """
-
-    pascals: FloatArray
+    pascals: FloatArray  #: of every square, 0 where nothing presses.
     left: float
-    turns: int
+    """share of the energy by which the search ended short of the least; ``SETTLED`` or less where it
+    settled."""
+    turns: int  #: of the search.
 
 
 class _Search:
@@ -134,28 +129,18 @@ class _Search:
 
 @dataclass(frozen=True, eq=False)
 class ContactForce:
-    """The forces of some presses.
+    """The forces of some presses."""
 
-    Attributes:
-        newtons: ``(n,)``, along the gel's normal; exactly 0 without contact.
-        uncertainty: ``(n,)`` N, one standard deviation.
-        shares: ``(n, len(PARTS))`` what it is put together from, as shares of the force.
-        pressure: ``(n, rows, columns)`` Pa.
-        centre: ``(n, 2)`` metres, where the force acts, x and y in ``gel``; NaN without contact.
-        lower_bound: ``(n,)`` whether the contact reaches the border: there is more of it than is seen.
-        depth_share: ``(n,)`` how deep the press is, in thicknesses.
-        strain: ``(n,)`` how deep it is, in radii of a disc of the area that the object takes; 0 without
-            contact.
-    """
-
-    newtons: FloatArray
-    uncertainty: FloatArray
-    shares: FloatArray
-    pressure: FloatArray
-    centre: FloatArray
+    newtons: FloatArray  #: ``(n,)``, along the gel's normal; exactly 0 without contact.
+    uncertainty: FloatArray  #: ``(n,)`` N, one standard deviation.
+    shares: FloatArray  #: ``(n, len(PARTS))`` what it is put together from, as shares of the force.
+    pressure: FloatArray  #: ``(n, rows, columns)`` Pa.
+    centre: FloatArray  #: ``(n, 2)`` metres, where the force acts, x and y in ``gel``; NaN without contact.
     lower_bound: BoolArray
-    depth_share: FloatArray
+    """``(n,)`` whether the contact reaches the border: there is more of it than is seen."""
+    depth_share: FloatArray  #: ``(n,)`` how deep the press is, in thicknesses.
     strain: FloatArray
+    """``(n,)`` how deep it is, in radii of a disc of the area that the object takes; 0 without contact."""
 
     @property
     def beyond_checked(self) -> BoolArray:

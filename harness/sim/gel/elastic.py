@@ -41,23 +41,14 @@ _KNOTS = 40.0
 
 @dataclass(frozen=True)
 class GelElastic:
-    """An isotropic elastic gel that sticks to a rigid plate.
+    """An isotropic elastic gel that sticks to a rigid plate."""
 
-    Attributes:
-        young: Pa, Young's modulus.
-        young_share: one standard deviation of it, as a share.
-        poisson: Poisson's ratio, 0 to 0.5; a half is a gel that keeps its volume.
-        poisson_sigma: one standard deviation of it.
-        thickness_share: one standard deviation of the gel's thickness, as a share.
-        source: of the modulus.
-    """
-
-    young: float
-    young_share: float
-    poisson: float = 0.485
-    poisson_sigma: float = 0.01
-    thickness_share: float = 0.1
-    source: str = "given"
+    young: float  #: Pa, Young's modulus.
+    young_share: float  #: one standard deviation of it, as a share.
+    poisson: float = 0.485  #: Poisson's ratio, 0 to 0.5; a half is a gel that keeps its volume.
+    poisson_sigma: float = 0.01  #: one standard deviation of it.
+    thickness_share: float = 0.1  #: one standard deviation of the gel's thickness, as a share.
+    source: str = "given"  #: of the modulus.
 
     def __post_init__(self) -> None:
         if not 0.0 < self.young < math.inf:

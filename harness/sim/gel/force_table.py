@@ -25,40 +25,26 @@ _UNITS = {"depth_m": (1e3, "mm deep"), "volume_m3": (1e9, "mm^3 of the gel taken
 
 
 class ForceRow(StrictModel):
-    """What was measured at one depth.
+    """What was measured at one depth."""
 
-    Attributes:
-        at: metres, or cubic metres, by the table's ``of``.
-        force_n: N, mean of the readings.
-        sigma_n: N, one standard deviation of a press from that mean: the scatter of repeated presses, with
-            the force sensor's own uncertainty.
-    """
-
-    at: Above
-    force_n: Above
+    at: Above  #: metres, or cubic metres, by the table's ``of``.
+    force_n: Above  #: N, mean of the readings.
     sigma_n: Above
+    """N, one standard deviation of a press from that mean: the scatter of repeated presses, with the force
+    sensor's own uncertainty."""
 
 
 class ForceTable(StrictModel):
-    """Forces of one gel and one kind of object, least first.
+    """Forces of one gel and one kind of object, least first."""
 
-    Attributes:
-        schema_number: of the file.
-        sensor: make.
-        serial: of the very gel.
-        indenter: what was pressed, in words.
-        made_from: the readings.
-        of: what ``at`` is: the deepest pixel, or the volume between the object and the untouched gel.
-        rows: both ``at`` and ``force_n`` rise.
-    """
-
-    schema_number: Literal[1] = Field(alias="schema")
-    sensor: Said
-    serial: str
-    indenter: Said
-    made_from: Said
+    schema_number: Literal[1] = Field(alias="schema")  #: of the file.
+    sensor: Said  #: make.
+    serial: str  #: of the very gel.
+    indenter: Said  #: what was pressed, in words.
+    made_from: Said  #: the readings.
     of: Literal["depth_m", "volume_m3"]
-    rows: Annotated[list[ForceRow], Field(min_length=3)]
+    """what ``at`` is: the deepest pixel, or the volume between the object and the untouched gel."""
+    rows: Annotated[list[ForceRow], Field(min_length=3)]  #: both ``at`` and ``force_n`` rise.
 
     @model_validator(mode="after")
     def _rises(self) -> "ForceTable":

@@ -25,16 +25,11 @@ class GelSkirt:
     """How a gel hangs from what presses it: blurs repeated with the core put back.
 
     The constants of Taxim (Si and Yuan, 2022) and ObjectFolder 2.0, in pixels of the sensor.
-
-    Attributes:
-        kernels: odd widths in pixels of the Gaussian blurs, widest first.
-        final: odd width in pixels of the last blur, over the core too.
-        core: share of the greatest penetration above which the object shapes the gel.
     """
 
-    kernels: tuple[int, ...] = (11, 5)
-    final: int = 5
-    core: float = 0.2
+    kernels: tuple[int, ...] = (11, 5)  #: odd widths in pixels of the Gaussian blurs, widest first.
+    final: int = 5  #: odd width in pixels of the last blur, over the core too.
+    core: float = 0.2  #: share of the greatest penetration above which the object shapes the gel.
 
 
 TAXIM_SKIRT = GelSkirt(kernels=(201, 101, 51, 21, 11, 5), final=5, core=0.4)

@@ -28,16 +28,12 @@ _NO_HEIGHT = 1e6
 
 @dataclass(frozen=True, eq=False)
 class GivenHeights:
-    """A height map, and where there was none.
+    """A height map, and where there was none."""
 
-    Attributes:
-        heights: ``(rows, columns)`` metres, finite.
-        missing: ``(rows, columns)`` where no height came: of an object 0 stands there, and the gel's skirt
-            hangs over it as over anything that does not reach it; a gel is spanned from its edge inwards.
-    """
-
-    heights: FloatArray
+    heights: FloatArray  #: ``(rows, columns)`` metres, finite.
     missing: BoolArray
+    """``(rows, columns)`` where no height came: of an object 0 stands there, and the gel's skirt hangs over
+    it as over anything that does not reach it; a gel is spanned from its edge inwards."""
 
 
 def read_heights(path: Path, sensor: TactileSensor, of: Heights = "object") -> GivenHeights:

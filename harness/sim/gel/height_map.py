@@ -25,15 +25,10 @@ _RIGID_TOLERANCE = 1e-6
 
 
 class RasterMesh:
-    """A mesh prepared once for any number of views; read-only and safe to share by threads.
+    """A mesh prepared once for any number of views; read-only and safe to share by threads."""
 
-    Attributes:
-        mesh: in metres, in the object's frame.
-        clusters: its faces by neighbourhood, as the z-buffer takes them.
-    """
-
-    mesh: Mesh
-    clusters: Clusters
+    mesh: Mesh  #: in metres, in the object's frame.
+    clusters: Clusters  #: its faces by neighbourhood, as the z-buffer takes them.
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
@@ -43,15 +38,10 @@ class RasterMesh:
 
 @dataclass(frozen=True, eq=False)
 class DepthImage:
-    """The first surface met along +z of a view.
+    """The first surface met along +z of a view."""
 
-    Attributes:
-        depth: ``(rows, columns)`` metres, z in the view's frame; +inf where nothing is met.
-        face: ``(rows, columns)`` index of the mesh's face that is met, -1 where none is.
-    """
-
-    depth: FloatArray
-    face: IntArray
+    depth: FloatArray  #: ``(rows, columns)`` metres, z in the view's frame; +inf where nothing is met.
+    face: IntArray  #: ``(rows, columns)`` index of the mesh's face that is met, -1 where none is.
 
 
 def height_maps(raster: RasterMesh, gel_from_object: FloatArray, sensor: TactileSensor) -> FloatArray:

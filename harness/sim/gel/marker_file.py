@@ -23,57 +23,32 @@ Count = Annotated[int, Field(gt=0)]
 
 
 class MarkerDot(StrictModel):
-    """One dot of a resting gel.
+    """One dot of a resting gel."""
 
-    Attributes:
-        row: of the grid, downwards from 0.
-        column: of the grid, to the right from 0.
-        x_px: pixels, column of its middle in the picture.
-        y_px: pixels, row.
-        sigma_px: pixels, one standard uncertainty of either.
-        radius_px: pixels.
-    """
-
-    row: Annotated[int, Field(ge=0)]
-    column: Annotated[int, Field(ge=0)]
-    x_px: Finite
-    y_px: Finite
-    sigma_px: Above
-    radius_px: Above
+    row: Annotated[int, Field(ge=0)]  #: of the grid, downwards from 0.
+    column: Annotated[int, Field(ge=0)]  #: of the grid, to the right from 0.
+    x_px: Finite  #: pixels, column of its middle in the picture.
+    y_px: Finite  #: pixels, row.
+    sigma_px: Above  #: pixels, one standard uncertainty of either.
+    radius_px: Above  #: pixels.
 
 
 class MarkerFile(StrictModel):
-    """Every dot of a gel.
+    """Every dot of a gel."""
 
-    Attributes:
-        schema_number: of the file.
-        sensor: make.
-        serial: of the very gel.
-        made_from: the pictures, by their hash.
-        picture_rows: pixels.
-        picture_columns: pixels.
-        pitch_m: m a pixel; None where nothing told it.
-        ink: share of the light that a dot gives back.
-        rows: of the grid.
-        columns: of the grid.
-        spacing_px: pixels from dot to dot.
-        turned_rad: rad, of the grid's rows in the picture.
-        dots: those that are in the picture.
-    """
-
-    schema_number: Literal[1] = Field(alias="schema")
-    sensor: str
-    serial: str
-    made_from: str
-    picture_rows: Count
-    picture_columns: Count
-    pitch_m: Above | None
-    ink: Annotated[float, Field(ge=0.0, le=1.0)]
-    rows: Count
-    columns: Count
-    spacing_px: Above
-    turned_rad: Finite
-    dots: Annotated[list[MarkerDot], Field(min_length=1)]
+    schema_number: Literal[1] = Field(alias="schema")  #: of the file.
+    sensor: str  #: make.
+    serial: str  #: of the very gel.
+    made_from: str  #: the pictures, by their hash.
+    picture_rows: Count  #: pixels.
+    picture_columns: Count  #: pixels.
+    pitch_m: Above | None  #: m a pixel; None where nothing told it.
+    ink: Annotated[float, Field(ge=0.0, le=1.0)]  #: share of the light that a dot gives back.
+    rows: Count  #: of the grid.
+    columns: Count  #: of the grid.
+    spacing_px: Above  #: pixels from dot to dot.
+    turned_rad: Finite  #: rad, of the grid's rows in the picture.
+    dots: Annotated[list[MarkerDot], Field(min_length=1)]  #: those that are in the picture.
 
     @property
     def places(self) -> FloatArray:

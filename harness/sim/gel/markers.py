@@ -48,17 +48,11 @@ _FARTHEST = 60.0
 
 @dataclass(frozen=True, eq=False)
 class LayerKernel:
-    """Surface displacement around one push, per load.
+    """Surface displacement around one push, per load."""
 
-    Attributes:
-        inwards: of the distance in metres: into the gel.
-        outwards: of the distance in metres: along the surface, away from the push.
-        reach: metres, the largest distance that may be asked for.
-    """
-
-    inwards: CubicSpline
-    outwards: CubicSpline
-    reach: float
+    inwards: CubicSpline  #: of the distance in metres: into the gel.
+    outwards: CubicSpline  #: of the distance in metres: along the surface, away from the push.
+    reach: float  #: metres, the largest distance that may be asked for.
 
 
 def rest_markers(sensor: TactileSensor) -> FloatArray:

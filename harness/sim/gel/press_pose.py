@@ -31,17 +31,11 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class ContactPlace:
-    """A place of a surface.
+    """A place of a surface."""
 
-    Attributes:
-        point: ``(3,)`` metres, in the object's frame, on the surface.
-        normal: ``(3,)`` unit, outward, smooth over bends.
-        moved: metres from where it was asked for.
-    """
-
-    point: FloatArray
-    normal: FloatArray
-    moved: float
+    point: FloatArray  #: ``(3,)`` metres, in the object's frame, on the surface.
+    normal: FloatArray  #: ``(3,)`` unit, outward, smooth over bends.
+    moved: float  #: metres from where it was asked for.
 
 
 def contact_place(mesh: Mesh, asked: FloatArray) -> ContactPlace:

@@ -19,25 +19,17 @@ _UNIT_ERROR = 1e-6
 class Presses:
     """``n`` presses of a gel, each as ``harness.sim.gel.press_pose.gel_from_object`` means one.
 
-    Attributes:
-        points: ``(n, 3)`` m, places of the surface in the object's frame.
-        normals: ``(n, 3)`` unit, outward there, smooth over bends (``press_pose.contact_place``).
-        depths: ``(n,)`` m from the undeformed gel to the place along the gel's z axis.
-        tilts: ``(n,)`` rad between the gel's z axis and the inward normal.
-        azimuths: ``(n,)`` rad, where the gel's z axis leans to.
-        yaws: ``(n,)`` rad about the gel's z axis.
-
     Raises:
         WrongUse: shapes that do not belong together, numbers that are not finite, normals of another
             length than one.
     """
 
-    points: FloatArray
-    normals: FloatArray
-    depths: FloatArray
-    tilts: FloatArray
-    azimuths: FloatArray
-    yaws: FloatArray
+    points: FloatArray  #: ``(n, 3)`` m, places of the surface in the object's frame.
+    normals: FloatArray  #: ``(n, 3)`` unit, outward there, smooth over bends (``press_pose.contact_place``).
+    depths: FloatArray  #: ``(n,)`` m from the undeformed gel to the place along the gel's z axis.
+    tilts: FloatArray  #: ``(n,)`` rad between the gel's z axis and the inward normal.
+    azimuths: FloatArray  #: ``(n,)`` rad, where the gel's z axis leans to.
+    yaws: FloatArray  #: ``(n,)`` rad about the gel's z axis.
 
     def __post_init__(self) -> None:
         count = len(self.points)

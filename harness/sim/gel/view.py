@@ -30,31 +30,22 @@ POOL = 4
 
 @dataclass(frozen=True, eq=False)
 class ToolView:
-    """The object seen along the tool, with the touch term at each place filled in on demand.
+    """The object seen along the tool, with the touch term at each place filled in on demand."""
 
-    Attributes:
-        object_from_view: ``(3, 3)``, columns x and y of the gel's image and z along the tool.
-        origin: ``(2,)`` metres, view x and y of the centre of pixel (0, 0).
-        pitch: metres a pixel, half of the touch map's.
-        depth: ``(rows, columns)`` metres along z of the first surface, inf where there is none.
-        nearest: for blocks of ``POOL`` pixels each way, metres along z: the gel's centre cannot be
-            nearer to the arm, or nothing would touch it.
-        farthest: for the same blocks, metres along z: it cannot be farther, or the object would
-            reach through the gel.
-        score: ``(rows, columns)`` nats, NaN where not asked for yet.
-        gel_depth: ``(rows, columns)`` metres along z of the gel's centre, from the fit.
-        lean: ``(rows, columns, LEAN)`` of the fit: what an attitude expected of the gel changes of the score.
-    """
-
-    object_from_view: FloatArray
-    origin: FloatArray
-    pitch: float
-    depth: FloatArray
+    object_from_view: FloatArray  #: ``(3, 3)``, columns x and y of the gel's image and z along the tool.
+    origin: FloatArray  #: ``(2,)`` metres, view x and y of the centre of pixel (0, 0).
+    pitch: float  #: metres a pixel, half of the touch map's.
+    depth: FloatArray  #: ``(rows, columns)`` metres along z of the first surface, inf where there is none.
     nearest: FloatArray
+    """for blocks of ``POOL`` pixels each way, metres along z: the gel's centre cannot be nearer to the arm,
+    or nothing would touch it."""
     farthest: FloatArray
-    score: FloatArray
-    gel_depth: FloatArray
+    """for the same blocks, metres along z: it cannot be farther, or the object would reach through the
+    gel."""
+    score: FloatArray  #: ``(rows, columns)`` nats, NaN where not asked for yet.
+    gel_depth: FloatArray  #: ``(rows, columns)`` metres along z of the gel's centre, from the fit.
     lean: FloatArray
+    """``(rows, columns, LEAN)`` of the fit: what an attitude expected of the gel changes of the score."""
 
 
 def view_along(

@@ -23,24 +23,16 @@ class Appearance:
 
     The albedo of a place is the corners' tints, interpolated, times the texture there, interpolated
     between texel centres in linear light. Textures repeat.
-
-    Attributes:
-        mesh: in metres, in the object's frame; need not be closed.
-        normals: ``(m, 3, 3)`` unit, of each face's corners, outward: what the shading follows.
-        tints: ``(m, 3, 3)`` linear red, green, blue of each face's corners, 0 to 1.
-        places: ``(m, 3, 2)`` (u, v) in the texture of each face's corners: u right, v up, 1 is its side.
-        texture_of: ``(m,)`` index of each face's texture; -1 where it has none.
-        textures: ``(rows, columns, 3)`` sRGB of 8 bits.
-        remarks: what was assumed, and what in the file was not followed.
     """
 
-    mesh: Mesh
-    normals: FloatArray
-    tints: FloatArray
+    mesh: Mesh  #: in metres, in the object's frame; need not be closed.
+    normals: FloatArray  #: ``(m, 3, 3)`` unit, of each face's corners, outward: what the shading follows.
+    tints: FloatArray  #: ``(m, 3, 3)`` linear red, green, blue of each face's corners, 0 to 1.
     places: FloatArray
-    texture_of: IntArray
-    textures: tuple[ByteArray, ...] = ()
-    remarks: tuple[str, ...] = ()
+    """``(m, 3, 2)`` (u, v) in the texture of each face's corners: u right, v up, 1 is its side."""
+    texture_of: IntArray  #: ``(m,)`` index of each face's texture; -1 where it has none.
+    textures: tuple[ByteArray, ...] = ()  #: ``(rows, columns, 3)`` sRGB of 8 bits.
+    remarks: tuple[str, ...] = ()  #: what was assumed, and what in the file was not followed.
 
     def __post_init__(self) -> None:
         count = len(self.mesh.faces)

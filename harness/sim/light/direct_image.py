@@ -32,57 +32,36 @@ Place = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class VisibleSurface:
-    """What a camera sees of an object, before any light.
+    """What a camera sees of an object, before any light."""
 
-    Attributes:
-        camera: that looks.
-        samples: a side of a pixel.
-        pixel: ``(n,)`` index, row by row, of each sample that meets the object.
-        quarter: ``(n,)`` which quarter of its pixel's samples it is of, 0 to 3.
-        depth: ``(n,)`` m, z in the camera's frame.
-        places: ``(n)`` of the surface.
-    """
-
-    camera: Pinhole
-    samples: int
-    pixel: IntArray
-    quarter: IntArray
-    depth: FloatArray
-    places: Places
+    camera: Pinhole  #: that looks.
+    samples: int  #: a side of a pixel.
+    pixel: IntArray  #: ``(n,)`` index, row by row, of each sample that meets the object.
+    quarter: IntArray  #: ``(n,)`` which quarter of its pixel's samples it is of, 0 to 3.
+    depth: FloatArray  #: ``(n,)`` m, z in the camera's frame.
+    places: Places  #: ``(n)`` of the surface.
 
 
 @dataclass(frozen=True, eq=False)
 class DirectImage:
-    """A picture with what is known of it.
+    """A picture with what is known of it."""
 
-    Attributes:
-        image: linear light, coverage and depth.
-        normal: ``(rows, columns, 3)`` unit, object's frame, mean over what is covered; zero elsewhere.
-        noise: linear light, root mean square over pixels and channels: what more samples would change;
-            None for one sample a pixel, which tells nothing of it.
-        alpha_noise: the same of coverage.
-        samples: a side of a pixel.
-        seconds: by what was done.
-    """
-
-    image: LinearImage
+    image: LinearImage  #: linear light, coverage and depth.
     normal: FloatArray
+    """``(rows, columns, 3)`` unit, object's frame, mean over what is covered; zero elsewhere."""
     noise: float | None
-    alpha_noise: float | None
-    samples: int
-    seconds: Mapping[str, float]
+    """linear light, root mean square over pixels and channels: what more samples would change; None for one
+    sample a pixel, which tells nothing of it."""
+    alpha_noise: float | None  #: the same of coverage.
+    samples: int  #: a side of a pixel.
+    seconds: Mapping[str, float]  #: by what was done.
 
 
 class LitObject:
-    """An object prepared once for any number of pictures; read-only and safe to share by threads.
+    """An object prepared once for any number of pictures; read-only and safe to share by threads."""
 
-    Attributes:
-        appearance: of its surface.
-        rays: through its faces.
-    """
-
-    appearance: Appearance
-    rays: RayMesh
+    appearance: Appearance  #: of its surface.
+    rays: RayMesh  #: through its faces.
 
     def __init__(self, appearance: Appearance) -> None:
         """Sort the faces; errors as of ``RayMesh``."""

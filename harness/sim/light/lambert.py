@@ -20,23 +20,14 @@ _LIFTED = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Places of a surface, each on the side that is seen.
+    """Places of a surface, each on the side that is seen."""
 
-    Attributes:
-        faces: ``(n,)`` indices.
-        points: ``(n, 3)`` m, in the object's frame.
-        normals: ``(n, 3)`` unit, of the smooth surface, on the side that is seen.
-        flat: ``(n, 3)`` unit, of the face, on that side.
-        lifted: ``(n, 3)`` m, where a ray towards a light begins.
-        albedo: ``(n, 3)`` linear.
-    """
-
-    faces: IntArray
-    points: FloatArray
-    normals: FloatArray
-    flat: FloatArray
-    lifted: FloatArray
-    albedo: FloatArray
+    faces: IntArray  #: ``(n,)`` indices.
+    points: FloatArray  #: ``(n, 3)`` m, in the object's frame.
+    normals: FloatArray  #: ``(n, 3)`` unit, of the smooth surface, on the side that is seen.
+    flat: FloatArray  #: ``(n, 3)`` unit, of the face, on that side.
+    lifted: FloatArray  #: ``(n, 3)`` m, where a ray towards a light begins.
+    albedo: FloatArray  #: ``(n, 3)`` linear.
 
     def __len__(self) -> int:
         return len(self.faces)

@@ -37,27 +37,16 @@ _SIDES = {f"{axis}-{end}": (number, end) for number, axis in enumerate("xyz") fo
 
 @dataclass(frozen=True, eq=False)
 class FileModes:
-    """The modes of a mesh, and how they came about.
+    """The modes of a mesh, and how they came about."""
 
-    Attributes:
-        solution: the modes.
-        volume: whether the file held tetrahedra.
-        units: the unit that the file's numbers were taken in; metres of a built-in object.
-        bodies: separate ones.
-        edge: m, longest edge of an element aimed at; None for a volume mesh.
-        held: nodes that are held.
-        seconds: of ``"intake"``, ``"mesh"``, ``"assemble"`` and ``"solve"``.
-        said: what was done to the mesh and what to look at, a sentence each.
-    """
-
-    solution: Solution
-    volume: bool
-    units: str
-    bodies: int
-    edge: float | None
-    held: int
-    seconds: Mapping[str, float]
-    said: tuple[str, ...]
+    solution: Solution  #: the modes.
+    volume: bool  #: whether the file held tetrahedra.
+    units: str  #: the unit that the file's numbers were taken in; metres of a built-in object.
+    bodies: int  #: separate ones.
+    edge: float | None  #: m, longest edge of an element aimed at; None for a volume mesh.
+    held: int  #: nodes that are held.
+    seconds: Mapping[str, float]  #: of ``"intake"``, ``"mesh"``, ``"assemble"`` and ``"solve"``.
+    said: tuple[str, ...]  #: what was done to the mesh and what to look at, a sentence each.
 
 
 @dataclass(frozen=True)

@@ -39,19 +39,12 @@ _SAME = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class EigenPairs:
-    """The modes of a system.
+    """The modes of a system."""
 
-    Attributes:
-        values: ``(m,)`` (rad/s)^2, ascending.
-        vectors: ``(u, m)`` 1/sqrt(kg), mass-orthonormal, of the system's unknowns.
-        residual: the worst ``|K x - w^2 M x| / (w^2 |M x|)``.
-        certified: whether an inertia count confirmed that none is missing.
-    """
-
-    values: FloatArray
-    vectors: FloatArray
-    residual: float
-    certified: bool
+    values: FloatArray  #: ``(m,)`` (rad/s)^2, ascending.
+    vectors: FloatArray  #: ``(u, m)`` 1/sqrt(kg), mass-orthonormal, of the system's unknowns.
+    residual: float  #: the worst ``|K x - w^2 M x| / (w^2 |M x|)``.
+    certified: bool  #: whether an inertia count confirmed that none is missing.
 
 
 def modes_below(system: ModalSystem, limit: float, most: int | None = None) -> tuple[EigenPairs, float]:
@@ -117,17 +110,11 @@ def _residual(system: ModalSystem, values: FloatArray, vectors: FloatArray) -> f
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Mass-orthonormal columns.
+    """Mass-orthonormal columns."""
 
-    Attributes:
-        unit: ``(u, b)``.
-        weighted: the mass matrix times them.
-        combination: ``(b, b)``, by which they give the block that they were made of.
-    """
-
-    unit: FloatArray
-    weighted: FloatArray
-    combination: FloatArray
+    unit: FloatArray  #: ``(u, b)``.
+    weighted: FloatArray  #: the mass matrix times them.
+    combination: FloatArray  #: ``(b, b)``, by which they give the block that they were made of.
 
 
 class _Lanczos:

@@ -18,37 +18,24 @@ tetrahedral mesh has faces of like size, so that the nearest one is among them."
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Free undamped vibration of one object.
+    """Free undamped vibration of one object."""
 
-    Attributes:
-        frequencies: ``(m,)`` Hz, ascending; elastic modes only, all up to ``limit``.
-        points: ``(n, 3)`` m, nodes of the surface in the object's frame.
-        normals: ``(n, 3)`` outward, of unit length.
-        faces: ``(f, 3)`` triangles of those nodes, outward.
-        shapes: ``(n, m, 3)`` 1/sqrt(kg), mass-normalised displacement of each mode at the nodes.
-            Its sign is arbitrary, and within a group of equal frequencies its basis.
-        limit: Hz, up to which every mode is listed.
-        mass: kg.
-        rigid: modes without a frequency that were left out: six for each body.
-        nodes: of the finite-element mesh.
-        elements: of the finite-element mesh.
-        residual: the worst ``|K x - w^2 M x| / (w^2 |M x|)`` of a listed mode, in the norm of
-            the inverse of the shifted stiffness.
-        seconds: by stage: ``"tetrahedra"``, ``"assembly"``, ``"solve"``.
-    """
-
-    frequencies: FloatArray
-    points: FloatArray
-    normals: FloatArray
-    faces: IntArray
+    frequencies: FloatArray  #: ``(m,)`` Hz, ascending; elastic modes only, all up to ``limit``.
+    points: FloatArray  #: ``(n, 3)`` m, nodes of the surface in the object's frame.
+    normals: FloatArray  #: ``(n, 3)`` outward, of unit length.
+    faces: IntArray  #: ``(f, 3)`` triangles of those nodes, outward.
     shapes: FloatArray
-    limit: float
-    mass: float
-    rigid: int
-    nodes: int
-    elements: int
+    """``(n, m, 3)`` 1/sqrt(kg), mass-normalised displacement of each mode at the nodes. Its sign is
+    arbitrary, and within a group of equal frequencies its basis."""
+    limit: float  #: Hz, up to which every mode is listed.
+    mass: float  #: kg.
+    rigid: int  #: modes without a frequency that were left out: six for each body.
+    nodes: int  #: of the finite-element mesh.
+    elements: int  #: of the finite-element mesh.
     residual: float
-    seconds: Mapping[str, float]
+    """the worst ``|K x - w^2 M x| / (w^2 |M x|)`` of a listed mode, in the norm of the inverse of the shifted
+    stiffness."""
+    seconds: Mapping[str, float]  #: by stage: ``"tetrahedra"``, ``"assembly"``, ``"solve"``.
 
     def at(self, points: FloatArray) -> FloatArray:
         """``(k, m, 3)`` 1/sqrt(kg): the shapes at the surface's nearest places to ``(k, 3)`` points in m.

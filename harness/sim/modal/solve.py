@@ -25,17 +25,11 @@ _SPARE = 6
 
 @dataclass(frozen=True, eq=False)
 class Elasticity:
-    """What each cell is made of.
+    """What each cell is made of."""
 
-    Attributes:
-        young: ``(c,)`` Pa.
-        poisson: ``(c,)``.
-        density: ``(c,)`` kg/m^3.
-    """
-
-    young: FloatArray
-    poisson: FloatArray
-    density: FloatArray
+    young: FloatArray  #: ``(c,)`` Pa.
+    poisson: FloatArray  #: ``(c,)``.
+    density: FloatArray  #: ``(c,)`` kg/m^3.
 
     @classmethod
     def uniform(cls, material: Material, cells: int) -> "Elasticity":
@@ -53,17 +47,11 @@ class Elasticity:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The modes of a mesh, and how sure it is that they are all.
+    """The modes of a mesh, and how sure it is that they are all."""
 
-    Attributes:
-        modes: up to their ``limit``.
-        certified: whether the inertia of ``K - w^2 M`` at the limit confirmed their number.
-        unknowns: displacements that were solved for.
-    """
-
-    modes: Modes
-    certified: bool
-    unknowns: int
+    modes: Modes  #: up to their ``limit``.
+    certified: bool  #: whether the inertia of ``K - w^2 M`` at the limit confirmed their number.
+    unknowns: int  #: displacements that were solved for.
 
 
 def solve_mesh(

@@ -43,23 +43,16 @@ class ModalSystem:
 
     Unknown ``3 i + d`` of a free object is the displacement of node ``i`` along axis ``d``; of one
     that is held, the unknowns are those of ``free``.
-
-    Attributes:
-        stiffness: ``(u, u)`` N/m, of the unknowns.
-        mass: ``(n, n)`` kg, the same for each axis.
-        rigid: ``(u, r)`` 1/sqrt(kg), mass-orthonormal motions without deformation: six for each
-            body that nothing holds.
-        shift: ``(rad/s)^2``, added to the eigenvalues so that the matrix can be factorised.
-        total: kg.
-        free: ``(u,)`` which of the ``3 n`` displacements are unknown; None for all.
     """
 
-    stiffness: SparseColumns
-    mass: SparseRows
+    stiffness: SparseColumns  #: ``(u, u)`` N/m, of the unknowns.
+    mass: SparseRows  #: ``(n, n)`` kg, the same for each axis.
     rigid: FloatArray
-    shift: float
-    total: float
-    free: IntArray | None = None
+    """``(u, r)`` 1/sqrt(kg), mass-orthonormal motions without deformation: six for each body that nothing
+    holds."""
+    shift: float  #: ``(rad/s)^2``, added to the eigenvalues so that the matrix can be factorised.
+    total: float  #: kg.
+    free: IntArray | None = None  #: ``(u,)`` which of the ``3 n`` displacements are unknown; None for all.
 
     def weighted(self, block: FloatArray) -> FloatArray:
         """The mass matrix times ``(u, b)`` vectors."""

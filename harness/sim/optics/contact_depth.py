@@ -54,35 +54,25 @@ _RIDGE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class ContactColour:
-    """A contact's colour in two parts.
+    """A contact's colour in two parts."""
 
-    Attributes:
-        slopes: ``(120, 3)`` coefficients of ``harness.sim.optics.shading``.
-        offset: ``(rows, columns, 3)`` grey levels that a contact adds to what its slope gives.
-        misfit: grey levels rms by which the table's bins differ from both together.
-    """
-
-    slopes: FloatArray
-    offset: FloatArray
-    misfit: float
+    slopes: FloatArray  #: ``(120, 3)`` coefficients of ``harness.sim.optics.shading``.
+    offset: FloatArray  #: ``(rows, columns, 3)`` grey levels that a contact adds to what its slope gives.
+    misfit: float  #: grey levels rms by which the table's bins differ from both together.
 
 
 @dataclass(frozen=True, eq=False)
 class Depth:
-    """A reading, and by what.
+    """A reading, and by what."""
 
-    Attributes:
-        read: heights, contact, where it can be trusted.
-        calibrations: of each picture: the colours of contacts over what the picture's gel would show at rest.
-        dimming: ``(n, rows, columns, 3)`` grey levels that contacts were taken to add whatever their slope.
-        drift: ``(n, 3)`` grey levels by which the light differs from the calibration's; zero where none was
-            looked for.
-    """
-
-    read: Inversion
+    read: Inversion  #: heights, contact, where it can be trusted.
     calibrations: tuple[TactileCalibration, ...]
+    """of each picture: the colours of contacts over what the picture's gel would show at rest."""
     dimming: FloatArray
+    """``(n, rows, columns, 3)`` grey levels that contacts were taken to add whatever their slope."""
     drift: FloatArray
+    """``(n, 3)`` grey levels by which the light differs from the calibration's; zero where none was looked
+    for."""
 
 
 def read_depth(images: ByteArray, calibration: TactileCalibration, detection: Detection = STEADY) -> Depth:

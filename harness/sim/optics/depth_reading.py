@@ -29,27 +29,16 @@ known radius read 2.0 to 2.6 mm deep where the radius of their contact gives 1.0
 
 @dataclass(frozen=True, eq=False)
 class DepthReading:
-    """What one press did to the gel.
+    """What one press did to the gel."""
 
-    Attributes:
-        image: ``(rows, columns, 3)`` RGB that was read, its pixels square.
-        height: ``(rows, columns)`` metres of indentation, 0 or more.
-        sigma: ``(rows, columns)`` metres, one standard deviation of each height.
-        depth: the reading with all it says of itself.
-        pitch: metres a pixel.
-        aspect: by which the picture was made square; 1 where it was.
-        seconds: of the processor, reading and its error.
-        notes: sentences for people about what was corrected before it was read.
-    """
-
-    image: ByteArray
-    height: FloatArray
-    sigma: FloatArray
-    depth: Depth
-    pitch: float
-    aspect: float
-    seconds: tuple[float, float]
-    notes: tuple[str, ...] = ()
+    image: ByteArray  #: ``(rows, columns, 3)`` RGB that was read, its pixels square.
+    height: FloatArray  #: ``(rows, columns)`` metres of indentation, 0 or more.
+    sigma: FloatArray  #: ``(rows, columns)`` metres, one standard deviation of each height.
+    depth: Depth  #: the reading with all it says of itself.
+    pitch: float  #: metres a pixel.
+    aspect: float  #: by which the picture was made square; 1 where it was.
+    seconds: tuple[float, float]  #: of the processor, reading and its error.
+    notes: tuple[str, ...] = ()  #: sentences for people about what was corrected before it was read.
 
     @property
     def contact(self) -> BoolArray:

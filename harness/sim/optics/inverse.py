@@ -45,20 +45,15 @@ class Detection:
 
     A face tilted by one degree changes the colour by about one grey level, and so does the
     camera's noise: the mean over a window is what is compared.
-
-    Attributes:
-        quiet: mean of 5 x 5 pixels below which the gel may be at rest.
-        strong: mean of 5 x 5 pixels that shows a contact.
-        wide: mean of 25 x 25 pixels that shows one too, for flat faces hardly tilted.
-        drifting: whether the light may have changed since the calibration's background was
-            taken; the change that most of the picture shares is then taken out, and with it
-            the tilt of a face that fills most of it. Better: a fresh background.
     """
 
-    quiet: float = 2.5
-    strong: float = 8.0
-    wide: float = 2.5
+    quiet: float = 2.5  #: mean of 5 x 5 pixels below which the gel may be at rest.
+    strong: float = 8.0  #: mean of 5 x 5 pixels that shows a contact.
+    wide: float = 2.5  #: mean of 25 x 25 pixels that shows one too, for flat faces hardly tilted.
     drifting: bool = False
+    """whether the light may have changed since the calibration's background was taken; the change that most
+    of the picture shares is then taken out, and with it the tilt of a face that fills most of it. Better: a
+    fresh background."""
 
 
 STEADY = Detection()
@@ -70,29 +65,22 @@ DRIFTING = Detection(quiet=6.0, strong=20.0, wide=12.0, drifting=True)
 
 @dataclass(frozen=True, eq=False)
 class Inversion:
-    """What the pictures say the gel did.
+    """What the pictures say the gel did."""
 
-    Attributes:
-        height: ``(n, rows, columns)`` metres of indentation, 0 or more, zero outside the imprint.
-        contact: ``(n, rows, columns)`` where the object surely shapes the gel (deeper than the
-            skirt's core share of the deepest point).
-        imprint: ``(n, rows, columns)`` where the gel moved at all.
-        trusted: ``(n, rows, columns)`` where the colour was explained by a slope within the
-            calibration's range; elsewhere the slope was held or doubtful.
-        error: ``(n, rows, columns)`` metres, one sigma estimated from colour noise and the
-            calibration's own residual.
-        anchored: ``(n,)`` whether some of the gel was at rest in view; if not, heights are
-            counted from their least.
-        seconds: for all of them.
-    """
-
-    height: FloatArray
+    height: FloatArray  #: ``(n, rows, columns)`` metres of indentation, 0 or more, zero outside the imprint.
     contact: BoolArray
-    imprint: BoolArray
+    """``(n, rows, columns)`` where the object surely shapes the gel (deeper than the skirt's core share of
+    the deepest point)."""
+    imprint: BoolArray  #: ``(n, rows, columns)`` where the gel moved at all.
     trusted: BoolArray
+    """``(n, rows, columns)`` where the colour was explained by a slope within the calibration's range;
+    elsewhere the slope was held or doubtful."""
     error: FloatArray
+    """``(n, rows, columns)`` metres, one sigma estimated from colour noise and the calibration's own
+    residual."""
     anchored: BoolArray
-    seconds: float
+    """``(n,)`` whether some of the gel was at rest in view; if not, heights are counted from their least."""
+    seconds: float  #: for all of them.
 
 
 def mean_picture(frames: ByteArray) -> ByteArray:

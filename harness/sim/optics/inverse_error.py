@@ -45,26 +45,20 @@ _FLOOR = 0.05
 
 @dataclass(frozen=True)
 class ColourError:
-    """What colours are off by.
+    """What colours are off by."""
 
-    Attributes:
-        camera: grey levels rms, from pixel to pixel.
-        alike: sine of the slope over which the calibration's misfit is alike (a Gaussian's sigma), where its
-            file does not state it.
-        share: of the calibration's residual that is misfit, and not texture or noise, where its file does not
-            state what held-out presses showed.
-        dimming: share by which a contact may be darker or brighter than the calibration's were.
-        draws: how many; the spread of 32 is known to an eighth.
-        light: grey levels rms by which the light of the picture differs from that of its resting picture,
-            alike over the picture or growing from one side of it to the other.
-    """
-
-    camera: float = 1.5
+    camera: float = 1.5  #: grey levels rms, from pixel to pixel.
     alike: float = 0.15
+    """sine of the slope over which the calibration's misfit is alike (a Gaussian's sigma), where its file
+    does not state it."""
     share: float = 0.4
-    dimming: float = 0.3
-    draws: int = 32
+    """of the calibration's residual that is misfit, and not texture or noise, where its file does not state
+    what held-out presses showed."""
+    dimming: float = 0.3  #: share by which a contact may be darker or brighter than the calibration's were.
+    draws: int = 32  #: how many; the spread of 32 is known to an eighth.
     light: float = 0.0
+    """grey levels rms by which the light of the picture differs from that of its resting picture, alike over
+    the picture or growing from one side of it to the other."""
 
 
 USUAL = ColourError()
@@ -72,15 +66,10 @@ USUAL = ColourError()
 
 @dataclass(frozen=True, eq=False)
 class HeightErrors:
-    """Equally likely errors of one recovered surface.
+    """Equally likely errors of one recovered surface."""
 
-    Attributes:
-        draws: ``(draws, rows, columns)`` metres.
-        floor: metres, one sigma, added to all of them.
-    """
-
-    draws: FloatArray
-    floor: float
+    draws: FloatArray  #: ``(draws, rows, columns)`` metres.
+    floor: float  #: metres, one sigma, added to all of them.
 
     @property
     def sigma(self) -> FloatArray:

@@ -53,17 +53,14 @@ def _not_said() -> Float32Array:
 
 @dataclass(frozen=True, eq=False)
 class LitCalibration(TactileCalibration):
-    """A calibration with the light of a press.
-
-    Attributes:
-        lit: ``(156, 3)``: 120 coefficients of slopes as in ``smooth``, then six of the position for each of
-            ``LIGHT_POWERS``, in grey levels a metre of indentation.
-        uncertainty: ``(bins, bins, 3)`` grey levels, the standard error of each colour of ``table``
-            (``calibration.taxim.table``); ``(0, 0, 3)`` in files that do not say it.
-    """
+    """A calibration with the light of a press."""
 
     lit: FloatArray
+    """``(156, 3)``: 120 coefficients of slopes as in ``smooth``, then six of the position for each of
+    ``LIGHT_POWERS``, in grey levels a metre of indentation."""
     uncertainty: Float32Array = field(default_factory=_not_said, kw_only=True)
+    """``(bins, bins, 3)`` grey levels, the standard error of each colour of ``table``
+    (``calibration.taxim.table``); ``(0, 0, 3)`` in files that do not say it."""
 
     def __post_init__(self) -> None:
         _require_errors(self.uncertainty, self.bins)
@@ -95,22 +92,16 @@ class LitCalibration(TactileCalibration):
 
 @dataclass(frozen=True, eq=False)
 class ShadowedCalibration(LitCalibration):
-    """A calibration with the light of a press and the shadows that presses throw.
-
-    Attributes:
-        shadow_directions: ``(d,)`` rad; this and the next two as ``harness.sim.optics.shadow.ShadowTable``
-        has them.
-        shadow_lengths: ``(3, d, k)``.
-        shadow_values: grey levels.
-        shadow_rays: ``(6,)`` metres where the first row of depths begins; metres from row to row; pixels from
-            sample to sample; rad of a fan to either side, and between its rays; metres, the depth of the rims
-            that were seen, which rows of other depths are derived from.
-    """
+    """A calibration with the light of a press and the shadows that presses throw."""
 
     shadow_directions: FloatArray
-    shadow_lengths: IntArray
-    shadow_values: FloatArray
+    """``(d,)`` rad; this and the next two as ``harness.sim.optics.shadow.ShadowTable`` has them."""
+    shadow_lengths: IntArray  #: ``(3, d, k)``.
+    shadow_values: FloatArray  #: grey levels.
     shadow_rays: FloatArray
+    """``(6,)`` metres where the first row of depths begins; metres from row to row; pixels from sample to
+    sample; rad of a fan to either side, and between its rays; metres, the depth of the rims that were seen,
+    which rows of other depths are derived from."""
 
     def __post_init__(self) -> None:
         if self.shadow_rays.shape != (6,) or not (np.isfinite(self.shadow_rays).all()):

@@ -33,18 +33,12 @@ OpticsLevel = Literal["exact", "fast"]
 
 @dataclass(frozen=True, eq=False)
 class TactileImages:
-    """Pictures and what they cannot show.
+    """Pictures and what they cannot show."""
 
-    Attributes:
-        images: ``(n, rows, columns, 3)`` RGB.
-        saturated: ``(n,)`` values clipped to 0 or 255.
-        extrapolated: ``(n,)`` pixels steeper than any press of the calibration, drawn as the
-            steepest it knows.
-    """
-
-    images: ByteArray
-    saturated: IntArray
+    images: ByteArray  #: ``(n, rows, columns, 3)`` RGB.
+    saturated: IntArray  #: ``(n,)`` values clipped to 0 or 255.
     extrapolated: IntArray
+    """``(n,)`` pixels steeper than any press of the calibration, drawn as the steepest it knows."""
 
 
 class Optics:

@@ -15,29 +15,19 @@ from harness.sim.optics.tactile_calibration import TactileCalibration
 
 @dataclass(frozen=True, eq=False)
 class Gel:
-    """A sensor and all that is known of its gel.
+    """A sensor and all that is known of its gel."""
 
-    Attributes:
-        sensor: its geometry; whether it casts shadows is said by ``shadow``.
-        calibration: of its colours.
-        rest: ``(rows, columns)`` metres, the untouched surface towards the camera; None for the sensor's.
-        shadow: of its light; None for one that casts none.
-        noise: grey levels, sigma of the camera's; 0 for none.
-        seed: of the noise.
-        dots: printed on it, as they were measured; None for the sensor's own grid, if it has one.
-        elastic: how stiff it is.
-        forces: measured on it; None where nobody did.
-    """
-
-    sensor: TactileSensor
-    calibration: TactileCalibration
+    sensor: TactileSensor  #: its geometry; whether it casts shadows is said by ``shadow``.
+    calibration: TactileCalibration  #: of its colours.
     rest: FloatArray | None = None
-    shadow: ShadowTable | None = None
-    noise: float = 0.0
-    seed: int = 0
+    """``(rows, columns)`` metres, the untouched surface towards the camera; None for the sensor's."""
+    shadow: ShadowTable | None = None  #: of its light; None for one that casts none.
+    noise: float = 0.0  #: grey levels, sigma of the camera's; 0 for none.
+    seed: int = 0  #: of the noise.
     dots: MarkerFile | None = None
-    elastic: GelElastic = NOT_MEASURED
-    forces: ForceTable | None = None
+    """printed on it, as they were measured; None for the sensor's own grid, if it has one."""
+    elastic: GelElastic = NOT_MEASURED  #: how stiff it is.
+    forces: ForceTable | None = None  #: measured on it; None where nobody did.
 
     def __post_init__(self) -> None:
         require_own(self.calibration, self.sensor)

@@ -32,18 +32,14 @@ _SURFACE_BLUR = 5
 
 @dataclass(frozen=True, eq=False)
 class PublishedPack:
-    """A published calibration.
-
-    Attributes:
-        calibration: the table over the untouched gel's picture. It claims nothing of its quality:
-            0 dB held out, an unbounded residual, every bin supported, no steepest slope.
-        rest: ``(rows, columns)`` metres, the untouched gel's surface towards the camera; None for a flat one.
-        shadow: of pins pressed into the gel; None where there is none.
-    """
+    """A published calibration."""
 
     calibration: TactileCalibration
+    """the table over the untouched gel's picture. It claims nothing of its quality: 0 dB held out, an
+    unbounded residual, every bin supported, no steepest slope."""
     rest: FloatArray | None
-    shadow: ShadowTable | None
+    """``(rows, columns)`` metres, the untouched gel's surface towards the camera; None for a flat one."""
+    shadow: ShadowTable | None  #: of pins pressed into the gel; None where there is none.
 
 
 def is_published(path: Path) -> bool:

@@ -32,29 +32,20 @@ depths begin, metres from one to the next, and rad from direction to direction."
 
 @dataclass(frozen=True, eq=False)
 class ShadowTable:
-    """What pins pressed into the gel were seen to throw.
-
-    Attributes:
-        directions: ``(d,)`` rad, evenly spaced over a turn: the middle of a list's fan. The k-th list is of
-            slopes that fall in directions from k spacings to k + 1.
-        lengths: ``(3, d, k)`` how many samples each channel, direction and depth has.
-        values: the samples, one list after another in the order of ``lengths``: grey levels
-            against the untouched gel, outwards from the pin.
-        shallowest: metres, the depth at which the first of the ``k`` rows begins.
-        depth_step: metres from row to row, above zero.
-        sample_step: pixels between samples.
-        fan: rad to either side of the slope's direction that are shaded too.
-        fan_step: rad between rays.
-    """
+    """What pins pressed into the gel were seen to throw."""
 
     directions: FloatArray
-    lengths: IntArray
+    """``(d,)`` rad, evenly spaced over a turn: the middle of a list's fan. The k-th list is of slopes that
+    fall in directions from k spacings to k + 1."""
+    lengths: IntArray  #: ``(3, d, k)`` how many samples each channel, direction and depth has.
     values: FloatArray
-    shallowest: float
-    depth_step: float = 0.1e-3
-    sample_step: float = 1.25
-    fan: float = 0.1
-    fan_step: float = 0.05
+    """the samples, one list after another in the order of ``lengths``: grey levels against the untouched gel,
+    outwards from the pin."""
+    shallowest: float  #: metres, the depth at which the first of the ``k`` rows begins.
+    depth_step: float = 0.1e-3  #: metres from row to row, above zero.
+    sample_step: float = 1.25  #: pixels between samples.
+    fan: float = 0.1  #: rad to either side of the slope's direction that are shaded too.
+    fan_step: float = 0.05  #: rad between rays.
 
     def __post_init__(self) -> None:
         if self.lengths.ndim != 3 or self.lengths.shape[:2] != (3, len(self.directions)):

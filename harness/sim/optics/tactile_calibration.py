@@ -32,15 +32,10 @@ _SHIPPED = Path(__file__).parent / "data"
 
 @dataclass(frozen=True)
 class ColourMisfit:
-    """What a calibration's colours are off by on presses that it was not fitted to, the camera's noise aside.
+    """Colour error of a calibration on presses that it was not fitted to, without the camera's noise."""
 
-    Attributes:
-        rms: grey levels, of one channel.
-        alike: sine of the slope over which it is alike (a Gaussian's sigma).
-    """
-
-    rms: float
-    alike: float
+    rms: float  #: grey levels, of one channel.
+    alike: float  #: sine of the slope over which it is alike (a Gaussian's sigma).
 
     def __post_init__(self) -> None:
         if not (0.0 <= self.rms < np.inf and 0.0 < self.alike <= 1.0):
@@ -52,43 +47,24 @@ class ColourMisfit:
 
 @dataclass(frozen=True)
 class CalibrationHeader:
-    """What a calibration says of itself.
+    """What a calibration says of itself."""
 
-    Attributes:
-        sensor: make.
-        serial: of the very sensor.
-        date: ISO 8601, of the fit.
-        made_from: the presses it was fitted to.
-        licence: of those presses.
-        pitch: metres a pixel.
-        ball_radius: metres, of the ball that was pressed.
-        slope_limit: sine of the steepest slope supported by the presses; steeper ones read as this.
-        held_out_db: median PSNR in decibels over presses left out of the fit, smooth model.
-        held_out_table_db: the same, table.
-        residual_rms: grey levels, of the smooth model over the presses.
-        condition: of the normalised least-squares problem.
-        skirt: of the gel.
-        misfit: on presses left out of the fit; None where it was not measured.
-        schema: of the file.
-        channel_order: of every image and coefficient.
-    """
-
-    sensor: str
-    serial: str
-    date: str
-    made_from: str
-    licence: str
-    pitch: float
-    ball_radius: float
-    slope_limit: float
-    held_out_db: float
-    held_out_table_db: float
-    residual_rms: float
-    condition: float
-    skirt: GelSkirt = field(default_factory=GelSkirt)
-    misfit: ColourMisfit | None = None
-    schema: int = SCHEMA
-    channel_order: str = CHANNEL_ORDER
+    sensor: str  #: make.
+    serial: str  #: of the very sensor.
+    date: str  #: ISO 8601, of the fit.
+    made_from: str  #: the presses it was fitted to.
+    licence: str  #: of those presses.
+    pitch: float  #: metres a pixel.
+    ball_radius: float  #: metres, of the ball that was pressed.
+    slope_limit: float  #: sine of the steepest slope supported by the presses; steeper ones read as this.
+    held_out_db: float  #: median PSNR in decibels over presses left out of the fit, smooth model.
+    held_out_table_db: float  #: the same, table.
+    residual_rms: float  #: grey levels, of the smooth model over the presses.
+    condition: float  #: of the normalised least-squares problem.
+    skirt: GelSkirt = field(default_factory=GelSkirt)  #: of the gel.
+    misfit: ColourMisfit | None = None  #: on presses left out of the fit; None where it was not measured.
+    schema: int = SCHEMA  #: of the file.
+    channel_order: str = CHANNEL_ORDER  #: of every image and coefficient.
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,21 +74,15 @@ class TactileCalibration:
     Slope magnitude m in [0, pi/2) and direction d in (-pi, pi] of the gel surface, its height
     growing towards the camera, index the table (Si and Yuan, Taxim, 2022, section III):
     row ``floor(m / (pi/2 / (bins - 1)))``, column ``floor((d + pi) / (2 pi / (bins - 1)))``.
-
-    Attributes:
-        header: provenance and quality.
-        background: ``(rows, columns, 3)`` what the camera sees of the untouched gel.
-        table: ``(bins, bins, 6, 3)`` grey levels per (x^2, y^2, xy, x, y, 1), x and y in pixels.
-        support: ``(bins, bins)`` whether presses reached the bin.
-        smooth: ``(20 * 6, 3)`` coefficients of the polynomial of ``harness.sim.optics.shading``;
-            ``(0, 3)`` where only a table is known.
     """
 
-    header: CalibrationHeader
-    background: ByteArray
-    table: Float32Array
-    support: BoolArray
+    header: CalibrationHeader  #: provenance and quality.
+    background: ByteArray  #: ``(rows, columns, 3)`` what the camera sees of the untouched gel.
+    table: Float32Array  #: ``(bins, bins, 6, 3)`` grey levels per (x^2, y^2, xy, x, y, 1), x and y in pixels.
+    support: BoolArray  #: ``(bins, bins)`` whether presses reached the bin.
     smooth: FloatArray
+    """``(20 * 6, 3)`` coefficients of the polynomial of ``harness.sim.optics.shading``; ``(0, 3)`` where only
+    a table is known."""
 
     def __post_init__(self) -> None:
         header, bins = self.header, len(self.table)

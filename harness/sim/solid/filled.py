@@ -32,15 +32,10 @@ _HALVINGS = 12
 
 @dataclass
 class FillingSeconds:
-    """What a filling took.
+    """What a filling took."""
 
-    Attributes:
-        wall: s on the clock.
-        cpu: s of the processor.
-    """
-
-    wall: float = 0.0
-    cpu: float = 0.0
+    wall: float = 0.0  #: s on the clock.
+    cpu: float = 0.0  #: s of the processor.
 
 
 def filled(

@@ -33,50 +33,29 @@ _SOLID_FILL, _SOLID_VOLUME = 0.6, 1e-4
 
 @dataclass(frozen=True)
 class IntakeReport:
-    """What was in the file and what was done to it.
+    """What was in the file and what was done to it."""
 
-    Attributes:
-        file: its name.
-        sha256: hash of its bytes.
-        units: the unit its numbers were taken in.
-        units_from: "asked", also against what the file declares, "declared by the file" or "the only reading
-            of its size".
-        scale: factor applied after the unit.
-        vertices_before: in the file.
-        faces_before: in the file.
-        vertices: handed on.
-        faces: handed on.
-        bodies: separate pieces handed on.
-        watertight: whether every edge joins two faces.
-        longest_side: metres.
-        area: square metres of surface.
-        volume: cubic metres enclosed; None where the surface is not closed.
-        wall: metres of wall the operator stated, or None.
-        repairs: what was done, in order.
-        warnings: what the operator should look at.
-        seconds: how long it took.
-        up_axis: how the file was rotated, for people; empty where its z was up.
-    """
-
-    file: str
-    sha256: str
-    units: str
+    file: str  #: its name.
+    sha256: str  #: hash of its bytes.
+    units: str  #: the unit its numbers were taken in.
     units_from: str
-    scale: float
-    vertices_before: int
-    faces_before: int
-    vertices: int
-    faces: int
-    bodies: int
-    watertight: bool
-    longest_side: float
-    area: float
-    volume: float | None
-    wall: float | None
-    repairs: tuple[str, ...]
-    warnings: tuple[str, ...]
-    seconds: float
-    up_axis: str = ""
+    """"asked", also against what the file declares, "declared by the file" or "the only reading of its
+    size"."""
+    scale: float  #: factor applied after the unit.
+    vertices_before: int  #: in the file.
+    faces_before: int  #: in the file.
+    vertices: int  #: handed on.
+    faces: int  #: handed on.
+    bodies: int  #: separate pieces handed on.
+    watertight: bool  #: whether every edge joins two faces.
+    longest_side: float  #: metres.
+    area: float  #: square metres of surface.
+    volume: float | None  #: cubic metres enclosed; None where the surface is not closed.
+    wall: float | None  #: metres of wall the operator stated, or None.
+    repairs: tuple[str, ...]  #: what was done, in order.
+    warnings: tuple[str, ...]  #: what the operator should look at.
+    seconds: float  #: how long it took.
+    up_axis: str = ""  #: how the file was rotated, for people; empty where its z was up.
 
     def mass(self, density: float) -> float | None:
         """Kilograms at ``density`` kg/m^3; None where neither a wall nor a closed surface says.

@@ -49,26 +49,18 @@ _COORDINATES = (1e-30, 1e30)
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """A file's triangles before anything is done to them.
-
-    Attributes:
-        vertices: ``(n, 3)`` in the file's unit, rotated about the file's origin until its up axis is z; may
-            repeat, may not be numbers.
-        faces: ``(m, 3)`` indices.
-        unit: name of the unit that the file declares, e.g. ``"in"`` or ``"0.1 m"``; None where there is none.
-        notes: what is odd of the file, a sentence each.
-        single: the file holds float32 coordinates.
-        metres: length of that unit in metres.
-        up_axis: how the file was rotated, for people; empty where z was up.
-    """
+    """A file's triangles before anything is done to them."""
 
     vertices: FloatArray
-    faces: IntArray
+    """``(n, 3)`` in the file's unit, rotated about the file's origin until its up axis is z; may repeat, may
+    not be numbers."""
+    faces: IntArray  #: ``(m, 3)`` indices.
     unit: str | None
-    notes: tuple[str, ...] = ()
-    single: bool = False
-    metres: float | None = None
-    up_axis: str = ""
+    """name of the unit that the file declares, e.g. ``"in"`` or ``"0.1 m"``; None where there is none."""
+    notes: tuple[str, ...] = ()  #: what is odd of the file, a sentence each.
+    single: bool = False  #: the file holds float32 coordinates.
+    metres: float | None = None  #: length of that unit in metres.
+    up_axis: str = ""  #: how the file was rotated, for people; empty where z was up.
 
 
 def read_mesh(path: Path, up_axis: str | None = None) -> RawMesh:

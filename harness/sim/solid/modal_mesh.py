@@ -16,17 +16,11 @@ _CHECKED_AT = np.vstack([STIFFNESS_POINTS, MASS_POINTS, np.eye(4)])
 
 @dataclass(frozen=True, eq=False)
 class QuadraticMesh:
-    """Tetrahedra with a node in the middle of every edge.
+    """Tetrahedra with a node in the middle of every edge."""
 
-    Attributes:
-        nodes: ``(n, 3)`` m; the corners first, in their old order.
-        cells: ``(c, 10)`` corners, and middles of the edges in the order of ``EDGES``.
-        faces: ``(f, 6)`` of the surface, outward: corners a, b, c and middles of ab, bc, ca.
-    """
-
-    nodes: FloatArray
-    cells: IntArray
-    faces: IntArray
+    nodes: FloatArray  #: ``(n, 3)`` m; the corners first, in their old order.
+    cells: IntArray  #: ``(c, 10)`` corners, and middles of the edges in the order of ``EDGES``.
+    faces: IntArray  #: ``(f, 6)`` of the surface, outward: corners a, b, c and middles of ab, bc, ca.
 
     @property
     def triangles(self) -> IntArray:

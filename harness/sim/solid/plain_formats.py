@@ -58,19 +58,12 @@ _COUNTS = re.compile(rb"\$(?:Nodes|Elements)[ \t\r]*\n[ \t]*(\d{1,20})(?:[ \t]+(
 
 @dataclass(frozen=True, eq=False)
 class PlainMesh:
-    """Triangles of a file without units.
+    """Triangles of a file without units."""
 
-    Attributes:
-        vertices: ``(n, 3)`` in the file's unit; may not be numbers.
-        faces: ``(m, 3)`` indices, from 0.
-        notes: what is odd of the file, a sentence each.
-        single: the file holds float32 coordinates.
-    """
-
-    vertices: FloatArray
-    faces: IntArray
-    notes: tuple[str, ...] = ()
-    single: bool = False
+    vertices: FloatArray  #: ``(n, 3)`` in the file's unit; may not be numbers.
+    faces: IntArray  #: ``(m, 3)`` indices, from 0.
+    notes: tuple[str, ...] = ()  #: what is odd of the file, a sentence each.
+    single: bool = False  #: the file holds float32 coordinates.
 
 
 def read_obj(path: Path) -> PlainMesh:

@@ -84,17 +84,11 @@ def with_rim_layer(of: Tetrahedra, wall: float) -> Tetrahedra:
 
 @dataclass(frozen=True, eq=False)
 class _Cut:
-    """Cells that are being cut where a field over their corners is 1.
+    """Cells that are being cut where a field over their corners is 1."""
 
-    Attributes:
-        nodes: ``(n, 3)`` m.
-        cells: ``(c, 4)``.
-        field: ``(n,)``, linear along edges.
-    """
-
-    nodes: FloatArray
-    cells: IntArray
-    field: FloatArray
+    nodes: FloatArray  #: ``(n, 3)`` m.
+    cells: IntArray  #: ``(c, 4)``.
+    field: FloatArray  #: ``(n,)``, linear along edges.
 
     def across(self) -> BoolArray:
         """``(c, 6)``: which edges have one end within and one beyond."""

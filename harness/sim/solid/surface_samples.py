@@ -29,19 +29,12 @@ _DENSITY_FOR_NORMALS = 4.0e6
 
 @dataclass(frozen=True, eq=False)
 class VoxelTable:
-    """The nearest sample of every voxel within reach of the surface.
+    """The nearest sample of every voxel within reach of the surface."""
 
-    Attributes:
-        origin: ``(3,)`` metres, the corner of voxel (0, 0, 0).
-        pitch: metres, the edge of a voxel.
-        nearest: ``(nx, ny, nz)`` int32 sample index, -1 beyond ``reach``.
-        reach: metres.
-    """
-
-    origin: FloatArray
-    pitch: float
-    nearest: AnyArray
-    reach: float
+    origin: FloatArray  #: ``(3,)`` metres, the corner of voxel (0, 0, 0).
+    pitch: float  #: metres, the edge of a voxel.
+    nearest: AnyArray  #: ``(nx, ny, nz)`` int32 sample index, -1 beyond ``reach``.
+    reach: float  #: metres.
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,22 +42,14 @@ class Surface:
     """Samples of a mesh, hardly a place on it farther than ``spacing`` from one that faces its way.
 
     About one place in ten thousand is farther, by up to a fifth: samples are chosen from random points.
-
-    Attributes:
-        spacing: metres.
-        points: ``(n, 3)`` metres, in the object's frame.
-        normals: ``(n, 3)`` unit, outward, averaged over 2 mm of the same face.
-        areas: ``(n,)`` square metres that each sample stands for.
-        neighbours: ``(n, NEIGHBOURS)`` int32, nearest first, the sample itself excluded.
-        table: nearest sample of any place.
     """
 
-    spacing: float
-    points: FloatArray
-    normals: FloatArray
-    areas: FloatArray
-    neighbours: AnyArray
-    table: VoxelTable
+    spacing: float  #: metres.
+    points: FloatArray  #: ``(n, 3)`` metres, in the object's frame.
+    normals: FloatArray  #: ``(n, 3)`` unit, outward, averaged over 2 mm of the same face.
+    areas: FloatArray  #: ``(n,)`` square metres that each sample stands for.
+    neighbours: AnyArray  #: ``(n, NEIGHBOURS)`` int32, nearest first, the sample itself excluded.
+    table: VoxelTable  #: nearest sample of any place.
 
     @cached_property
     def tree(self) -> cKDTree:

@@ -13,17 +13,11 @@ from harness.sim.solid.walls import walled
 
 @dataclass(frozen=True, eq=False)
 class TakenSurface:
-    """A closed surface around an object's material.
+    """A closed surface around an object's material."""
 
-    Attributes:
-        mesh: in metres, in the object's frame.
-        units: name of the unit of the file's numbers; metres of a built-in object.
-        said: what was read of a file, what was done to the mesh and what to look at.
-    """
-
-    mesh: Mesh
-    units: str
-    said: tuple[str, ...]
+    mesh: Mesh  #: in metres, in the object's frame.
+    units: str  #: name of the unit of the file's numbers; metres of a built-in object.
+    said: tuple[str, ...]  #: what was read of a file, what was done to the mesh and what to look at.
 
 
 def surface_of(mesh: str, units: str | None, wall: float | None, up_axis: str | None = None) -> TakenSurface:

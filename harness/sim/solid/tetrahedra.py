@@ -57,15 +57,10 @@ class _Lost(MeshRefused):
 
 @dataclass(frozen=True, eq=False)
 class Tetrahedra:
-    """A volume mesh.
+    """A volume mesh."""
 
-    Attributes:
-        nodes: ``(n, 3)`` m, each the corner of some cell.
-        cells: ``(c, 4)``, positively oriented.
-    """
-
-    nodes: FloatArray
-    cells: IntArray
+    nodes: FloatArray  #: ``(n, 3)`` m, each the corner of some cell.
+    cells: IntArray  #: ``(c, 4)``, positively oriented.
 
     @cached_property
     def volumes(self) -> FloatArray:

@@ -49,26 +49,17 @@ _NAMED = 4
 
 @dataclass(frozen=True, eq=False)
 class VolumeMesh:
-    """What a file holds, ready to be solved.
+    """What a file holds, ready to be solved."""
 
-    Attributes:
-        mesh: in metres, corners first, positively oriented.
-        sets: nodes by the name that the file gives them, numbered as in ``mesh``.
-        corners: nodes of a cell in the file: 4 or 10.
-        units: the unit its numbers were taken in.
-        bodies: separate pieces.
-        quality: the least fullness of a cell (see ``harness.sim.solid.tetrahedra.fullness``), times
-            ``6 sqrt(2)``: 1 where all are regular, 0 where one is flat.
-        said: what was read, what was done to the mesh and what to look at, a sentence each.
-    """
-
-    mesh: QuadraticMesh
-    sets: Mapping[str, IntArray]
-    corners: int
-    units: str
-    bodies: int
+    mesh: QuadraticMesh  #: in metres, corners first, positively oriented.
+    sets: Mapping[str, IntArray]  #: nodes by the name that the file gives them, numbered as in ``mesh``.
+    corners: int  #: nodes of a cell in the file: 4 or 10.
+    units: str  #: the unit its numbers were taken in.
+    bodies: int  #: separate pieces.
     quality: float
-    said: tuple[str, ...]
+    """the least fullness of a cell (see ``harness.sim.solid.tetrahedra.fullness``), times ``6 sqrt(2)``: 1
+    where all are regular, 0 where one is flat."""
+    said: tuple[str, ...]  #: what was read, what was done to the mesh and what to look at, a sentence each.
 
 
 def read_volume(path: Path, units: str | None = None, up_axis: str | None = None) -> VolumeMesh | None:

@@ -37,36 +37,22 @@ _LEGENDRE = np.polynomial.legendre.leggauss(_NODES)
 
 @dataclass(frozen=True)
 class Hammer:
-    """What strikes.
+    """What strikes."""
 
-    Attributes:
-        radius: m, of the tip's sphere.
-        young: Pa, of the tip.
-        poisson: of the tip.
-        mass: kg, that moves with the tip.
-    """
-
-    radius: float
-    young: float
-    poisson: float
-    mass: float
+    radius: float  #: m, of the tip's sphere.
+    young: float  #: Pa, of the tip.
+    poisson: float  #: of the tip.
+    mass: float  #: kg, that moves with the tip.
 
 
 @dataclass(frozen=True)
 class HertzPulse:
-    """The force of one blow, from the first touch on.
+    """The force of one blow, from the first touch on."""
 
-    Attributes:
-        duration: s, of the contact.
-        peak: N, at half of it.
-        impulse: N s.
-        approach: m, the deepest.
-    """
-
-    duration: float
-    peak: float
-    impulse: float
-    approach: float
+    duration: float  #: s, of the contact.
+    peak: float  #: N, at half of it.
+    impulse: float  #: N s.
+    approach: float  #: m, the deepest.
 
     def force(self, times: FloatArray) -> FloatArray:
         """N at times in s since the first touch; zero outside the contact."""

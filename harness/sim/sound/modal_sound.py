@@ -26,19 +26,12 @@ _LOWEST = -650.0
 
 @dataclass(frozen=True, eq=False)
 class Strikes:
-    """Blows on one object.
+    """Blows on one object."""
 
-    Attributes:
-        points: ``(k, 3)`` m, in the object's frame, on its surface.
-        directions: ``(k, 3)`` unit, of the force on the object.
-        force: ``(k, t)`` N.
-        rate: samples per second.
-    """
-
-    points: FloatArray
-    directions: FloatArray
-    force: FloatArray
-    rate: float
+    points: FloatArray  #: ``(k, 3)`` m, in the object's frame, on its surface.
+    directions: FloatArray  #: ``(k, 3)`` unit, of the force on the object.
+    force: FloatArray  #: ``(k, t)`` N.
+    rate: float  #: samples per second.
 
 
 def audible(frequencies: FloatArray, rate: float) -> BoolArray:

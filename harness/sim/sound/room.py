@@ -14,19 +14,12 @@ _DECAY = 3.0 * np.log(10.0)
 
 @dataclass(frozen=True)
 class MicrophoneResponse:
-    """A half-inch free-field capsule as IEC 61094-4 describes one: flat between its two ends.
+    """A half-inch free-field capsule as IEC 61094-4 describes one: flat between its two ends."""
 
-    Attributes:
-        vent: Hz, where the static-pressure vent has taken 3 dB.
-        resonance: Hz, of the diaphragm.
-        quality: of that resonance; 0.7 is the flattest.
-        distance: m from the object's middle.
-    """
-
-    vent: float = 3.0
-    resonance: float = 28e3
-    quality: float = 0.7
-    distance: float = 0.3
+    vent: float = 3.0  #: Hz, where the static-pressure vent has taken 3 dB.
+    resonance: float = 28e3  #: Hz, of the diaphragm.
+    quality: float = 0.7  #: of that resonance; 0.7 is the flattest.
+    distance: float = 0.3  #: m from the object's middle.
 
     def __post_init__(self) -> None:
         numbers = (self.vent, self.resonance, self.quality, self.distance)
@@ -45,19 +38,12 @@ class MicrophoneResponse:
 
 @dataclass(frozen=True)
 class RoomField:
-    """What a room adds to a sound; ``room_response`` says what the numbers mean.
+    """What a room adds to a sound; ``room_response`` says what the numbers mean."""
 
-    Attributes:
-        t60: s.
-        direct_to_reverberant_db: dB.
-        seed: of the tail.
-        length: s of response.
-    """
-
-    t60: float
-    direct_to_reverberant_db: float
-    seed: int
-    length: float = 0.5
+    t60: float  #: s.
+    direct_to_reverberant_db: float  #: dB.
+    seed: int  #: of the tail.
+    length: float = 0.5  #: s of response.
 
     def response(self, rate: float) -> FloatArray:
         """``(t,)`` at a rate in samples per second."""

@@ -37,24 +37,16 @@ _SIGMAS = 4.5
 
 @dataclass(frozen=True, eq=False)
 class Synthesis:
-    """Sounds and how far to trust them.
+    """Sounds and how far to trust them."""
 
-    Attributes:
-        sound: ``(k, t)``, float64, in the unit of the amplitudes.
-        rate: samples per second.
-        left_out: ``(m,)``: the modes at or above half of the rate, which have no part in it.
-        error: dB, of the worst sample against the same sum in exact arithmetic, relative to the
-            loudest sample of the same sound, the worst of the sounds; what the modes left out late
-            and the phases add to it is a bound, what rounding adds an estimate at 4.5 standard
-            deviations of a random walk. Minus infinity for silence.
-        seconds: s on the clock that it took.
-    """
-
-    sound: FloatArray
-    rate: float
-    left_out: BoolArray
+    sound: FloatArray  #: ``(k, t)``, float64, in the unit of the amplitudes.
+    rate: float  #: samples per second.
+    left_out: BoolArray  #: ``(m,)``: the modes at or above half of the rate, which have no part in it.
     error: float
-    seconds: float
+    """dB, of the worst sample against the same sum in exact arithmetic, relative to the loudest sample of the
+    same sound, the worst of the sounds; what the modes left out late and the phases add to it is a bound,
+    what rounding adds an estimate at 4.5 standard deviations of a random walk. Minus infinity for silence."""
+    seconds: float  #: s on the clock that it took.
 
 
 def synthesize(

@@ -56,17 +56,11 @@ for less than three quarters of the one before."""
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Underdamped modes, and how each turns from sample to sample.
+    """Underdamped modes, and how each turns from sample to sample."""
 
-    Attributes:
-        dampings: ``(m,)`` 1/s.
-        turns: ``(m,)`` turns of the phase per sample.
-        rate: samples per second.
-    """
-
-    dampings: FloatArray
-    turns: FloatArray
-    rate: float
+    dampings: FloatArray  #: ``(m,)`` 1/s.
+    turns: FloatArray  #: ``(m,)`` turns of the phase per sample.
+    rate: float  #: samples per second.
 
     def take(self, order: IntArray) -> "Steps":
         """Some of the modes, in an order."""
@@ -139,17 +133,11 @@ def _lasting(steps: Steps, counts: IntArray, blocks: int, length: int, level: Ta
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Modes that fall silent at about the same time.
+    """Modes that fall silent at about the same time."""
 
-    Attributes:
-        modes: of the ordered ones, from and to.
-        counts: ``(tiles,)`` blocks in which each tile sounds.
-        within: ``(block, 2 TILE tiles)`` table of one block.
-    """
-
-    modes: slice
-    counts: IntArray
-    within: AnyArray
+    modes: slice  #: of the ordered ones, from and to.
+    counts: IntArray  #: ``(tiles,)`` blocks in which each tile sounds.
+    within: AnyArray  #: ``(block, 2 TILE tiles)`` table of one block.
 
 
 class _Tables:

@@ -45,19 +45,14 @@ PRESSED = 1.0e-3
 
 @dataclass(frozen=True, eq=False)
 class LineTarget:
-    """Where a line leads.
-
-    Attributes:
-        end: ``(3,)`` m in base, of the gel's middle were nothing there; a line from above goes on down.
-        bearing: rad about the vertical, the side that a slanting line comes from; None for any.
-        above: whether it comes straight from above.
-        lowest: m above the support where it ends, coming from above.
-    """
+    """Where a line leads."""
 
     end: FloatArray
+    """``(3,)`` m in base, of the gel's middle were nothing there; a line from above goes on down."""
     bearing: float | None = None
-    above: bool = False
-    lowest: float = LOWEST
+    """rad about the vertical, the side that a slanting line comes from; None for any."""
+    above: bool = False  #: whether it comes straight from above.
+    lowest: float = LOWEST  #: m above the support where it ends, coming from above.
 
 
 def lines_to(

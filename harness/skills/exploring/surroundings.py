@@ -18,21 +18,13 @@ from harness.twin.strike_motion import PlannedStrike
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """The bench around an object of which too little is known.
+    """The bench around an object of which too little is known."""
 
-    Attributes:
-        scene: of the run.
-        station: whose arm it is.
-        travels: the bench with all the space that the object may take in its place.
-        nothing: the bench without an object.
-        joints: ``(6,)`` rad, where the arm is.
-    """
-
-    scene: SceneFile
-    station: Station
-    travels: TwinBench
-    nothing: TwinBench
-    joints: FloatArray
+    scene: SceneFile  #: of the run.
+    station: Station  #: whose arm it is.
+    travels: TwinBench  #: the bench with all the space that the object may take in its place.
+    nothing: TwinBench  #: the bench without an object.
+    joints: FloatArray  #: ``(6,)`` rad, where the arm is.
 
 
 def nowhere(place: FloatArray) -> Mesh:

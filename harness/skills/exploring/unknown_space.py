@@ -60,17 +60,11 @@ _ROUND = 16
 
 @dataclass(frozen=True, eq=False)
 class UnknownStand:
-    """Where an object of unknown shape was put, and what looks at it.
+    """Where an object of unknown shape was put, and what looks at it."""
 
-    Attributes:
-        place: ``(3,)`` m in base, nominally: its middle, on the support.
-        errors: of that, and of the camera.
-        camera: of the station; None without.
-    """
-
-    place: FloatArray
-    errors: CameraErrors
-    camera: CameraSection | None = None
+    place: FloatArray  #: ``(3,)`` m in base, nominally: its middle, on the support.
+    errors: CameraErrors  #: of that, and of the camera.
+    camera: CameraSection | None = None  #: of the station; None without.
 
     @property
     def looking(self) -> CameraSection:
@@ -81,20 +75,14 @@ class UnknownStand:
 
 @dataclass(frozen=True, eq=False)
 class SeenThing:
-    """Where an object of unknown shape is by a look, were it deep as it is wide.
+    """Where an object of unknown shape is by a look, were it deep as it is wide."""
 
-    Attributes:
-        middle: ``(3,)`` m in base.
-        ends: ``(2, 3)`` m in base, of its longest chord in the picture.
-        height: m above the support, of its top.
-        off: ``(2,)`` m in base: one standard deviation of where it is, along the line of sight; none where
-            it lies, and the support says how far off it is.
-    """
-
-    middle: FloatArray
-    ends: FloatArray
-    height: float
+    middle: FloatArray  #: ``(3,)`` m in base.
+    ends: FloatArray  #: ``(2, 3)`` m in base, of its longest chord in the picture.
+    height: float  #: m above the support, of its top.
     off: FloatArray
+    """``(2,)`` m in base: one standard deviation of where it is, along the line of sight; none where it lies,
+    and the support says how far off it is."""
 
     @property
     def lies(self) -> bool:

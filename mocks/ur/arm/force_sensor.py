@@ -19,11 +19,6 @@ class ForceSensor:
     """Readings of one cycle after another.
 
     Noise is a function of (seed, step of the run, cycles since the motion began), and of nothing else.
-
-    Attributes:
-        raw: ``(6,)`` N and N m in the flange's frame, bias included.
-        base: ``(6,)`` N and N m at the flange, in base, as exerted plus noise: no bias.
-        broken: whether ``at_tcp`` reads no numbers.
     """
 
     def __init__(self, config: ControllerConfig) -> None:
@@ -35,9 +30,10 @@ class ForceSensor:
         self._zero = [0.0] * 6
         self._noise = random.Random()
         self._recent: deque[Vector] = deque(maxlen=RECENT)
-        self.broken = False
-        self.raw: Six = NO_WRENCH
+        self.broken = False  #: whether ``at_tcp`` reads no numbers.
+        self.raw: Six = NO_WRENCH  #: ``(6,)`` N and N m in the flange's frame, bias included.
         self.base: Six = NO_WRENCH
+        """``(6,)`` N and N m at the flange, in base, as exerted plus noise: no bias."""
         self.begin_motion(0)
 
     def begin_motion(self, step: int) -> None:

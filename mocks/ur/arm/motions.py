@@ -15,15 +15,10 @@ from mocks.ur.hooks import CYCLE, Matrix, Six
 
 @dataclass(frozen=True)
 class Trapezoid:
-    """Rest to rest over one unit of way.
+    """Rest to rest over one unit of way."""
 
-    Attributes:
-        duration: s.
-        ramp: s of speeding up, and again of slowing down.
-    """
-
-    duration: float
-    ramp: float
+    duration: float  #: s.
+    ramp: float  #: s of speeding up, and again of slowing down.
 
     def share(self, time: float) -> float:
         """Share of the way done after ``time`` s, 0 to 1; exactly 1 from the end on."""
@@ -70,17 +65,11 @@ Twist = tuple[Vector, Vector]
 
 
 class ArmBody(Protocol):
-    """What a motion moves.
+    """What a motion moves."""
 
-    Attributes:
-        joints: rad, commanded.
-        speeds: rad/s, over the last cycle.
-        twist: of the tool centre point, over the last cycle.
-    """
-
-    joints: Six
-    speeds: Six
-    twist: Twist
+    joints: Six  #: rad, commanded.
+    speeds: Six  #: rad/s, over the last cycle.
+    twist: Twist  #: of the tool centre point, over the last cycle.
 
     @property
     def base_from_tcp(self) -> Matrix:

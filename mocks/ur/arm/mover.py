@@ -31,26 +31,17 @@ class MotionFault(Exception):
 
 
 class Mover:
-    """Implements ``motions.Body``.
-
-    Attributes:
-        joints: rad, commanded; the mock's joints follow exactly.
-        speeds: rad/s, over the last cycle.
-        accelerations: rad/s^2, over the last cycle.
-        twist: of the tool centre point, over the last cycle.
-        base_from_flange: as commanded.
-        motions: how many motions have begun from rest.
-    """
+    """Implements ``motions.Body``."""
 
     def __init__(self, arm: ArmModel, joints: Six) -> None:
         self.arm = arm
-        self.joints = joints
-        self.speeds: Six = (0.0,) * 6
-        self.accelerations: Six = (0.0,) * 6
-        self.twist = _AT_REST
-        self.base_from_flange = kinematics.forward(arm, joints)
+        self.joints = joints  #: rad, commanded; the mock's joints follow exactly.
+        self.speeds: Six = (0.0,) * 6  #: rad/s, over the last cycle.
+        self.accelerations: Six = (0.0,) * 6  #: rad/s^2, over the last cycle.
+        self.twist = _AT_REST  #: of the tool centre point, over the last cycle.
+        self.base_from_flange = kinematics.forward(arm, joints)  #: as commanded.
         self.history: deque[Six] = deque([joints], maxlen=HISTORY)
-        self.motions = 0
+        self.motions = 0  #: how many motions have begun from rest.
         self._flange_from_tcp = poses.IDENTITY
         self._tcp_from_flange = poses.IDENTITY
         self._base_from_tcp = self.base_from_flange

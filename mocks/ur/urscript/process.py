@@ -23,14 +23,10 @@ class Halted(Exception):
 
 
 class Task:
-    """One thread.
-
-    Attributes:
-        number: its handle, above zero.
-    """
+    """One thread."""
 
     def __init__(self, number: int) -> None:
-        self.number = number
+        self.number = number  #: its handle, above zero.
         self.renew()
 
     def spend(self) -> None:
@@ -130,11 +126,6 @@ class Process:
         main: steps of the main thread, given its frame.
         entered: is told the number of each thread that is resumed, and 0 when it pauses.
         released: is told the number of each thread that ends, so that what it held is let go.
-
-    Attributes:
-        variables: the globals.
-        current: number of the thread that runs now.
-        holder: the only thread that runs, in its critical section.
     """
 
     def __init__(
@@ -143,13 +134,13 @@ class Process:
         entered: Callable[[int], None],
         released: Callable[[int], None],
     ) -> None:
-        self.variables: dict[str, Any] = {}
-        self.current = 0
+        self.variables: dict[str, Any] = {}  #: the globals.
+        self.current = 0  #: number of the thread that runs now.
         self._entered = entered
         self._released = released
         self._tasks: dict[int, tuple[Task, Steps]] = {}
         self._started = 0
-        self.holder: Task | None = None
+        self.holder: Task | None = None  #: the only thread that runs, in its critical section.
         self._killed: set[int] = set()
         self._main = self.start(lambda task: main(self.frame(task)))
 

@@ -38,17 +38,11 @@ _HELPERS: Final[dict[str, Callable[..., Any]]] = {
 
 @dataclass(frozen=True)
 class Program:
-    """A text, ready to run.
+    """A text, ready to run."""
 
-    Attributes:
-        name: empty for plain statements.
-        main: steps of its own statements.
-        secondary: whether it runs beside the main program.
-    """
-
-    name: str
-    main: Callable[[CallFrame], Steps]
-    secondary: bool
+    name: str  #: empty for plain statements.
+    main: Callable[[CallFrame], Steps]  #: steps of its own statements.
+    secondary: bool  #: whether it runs beside the main program.
 
 
 def translate(text: str, builtins: Mapping[str, Callable[..., Any]]) -> Program:

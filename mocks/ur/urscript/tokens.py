@@ -26,17 +26,11 @@ _TOKEN: Final = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """One word.
+    """One word."""
 
-    Attributes:
-        kind: ``"number"``, ``"word"``, ``"keyword"``, ``"string"``, ``"symbol"`` or ``"end of text"``.
-        text: as written.
-        line: counted from 1.
-    """
-
-    kind: str
-    text: str
-    line: int
+    kind: str  #: ``"number"``, ``"word"``, ``"keyword"``, ``"string"``, ``"symbol"`` or ``"end of text"``.
+    text: str  #: as written.
+    line: int  #: counted from 1.
 
 
 class Tokens:

@@ -47,23 +47,14 @@ TURNED = np.radians(15.0)
 
 @dataclass(frozen=True)
 class ComparedRun:
-    """One run against one model.
+    """One run against one model."""
 
-    Attributes:
-        case: what was wrong: a key of ``CASES``, or ``"moved microphone"``.
-        run: the recording's name.
-        object: that was recorded.
-        verdicts: by sense.
-        sentences: of every sense.
-        seconds: of CPU.
-    """
-
-    case: str
-    run: str
-    object: str
-    verdicts: Mapping[Sense, Verdict]
-    sentences: Sequence[str]
-    seconds: float
+    case: str  #: what was wrong: a key of ``CASES``, or ``"moved microphone"``.
+    run: str  #: the recording's name.
+    object: str  #: that was recorded.
+    verdicts: Mapping[Sense, Verdict]  #: by sense.
+    sentences: Sequence[str]  #: of every sense.
+    seconds: float  #: of CPU.
 
     @property
     def doubts(self) -> tuple[str, ...]:

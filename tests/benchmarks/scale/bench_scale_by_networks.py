@@ -36,21 +36,13 @@ LEVELS = ("elements", "network")
 
 @dataclass(frozen=True)
 class AnsweredSize:
-    """One run, answered at one level of the sound's shapes.
+    """One run, answered at one level of the sound's shapes."""
 
-    Attributes:
-        level: one of ``LEVELS``.
-        sense: ``"audio"`` or ``"fused"``.
-        error: m.
-        inside: whether the truth is in the interval of 90 %.
-        seconds: of all senses' answers.
-    """
-
-    level: str
-    sense: str
-    error: float
-    inside: bool
-    seconds: float
+    level: str  #: one of ``LEVELS``.
+    sense: str  #: ``"audio"`` or ``"fused"``.
+    error: float  #: m.
+    inside: bool  #: whether the truth is in the interval of 90 %.
+    seconds: float  #: of all senses' answers.
 
 
 def answered(cell: ScaleCell, scene: SceneFile, station: Station) -> Iterator[AnsweredSize]:

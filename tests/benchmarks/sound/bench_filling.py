@@ -60,19 +60,13 @@ def as_it_comes(mesh: Mesh, edge: float) -> Filled:
 
 @dataclass
 class Filling:
-    """Fillings of one surface in one way.
+    """Fillings of one surface in one way."""
 
-    Attributes:
-        took: s of the processor of each.
-        cells: of the last.
-        flat: relative, by which each one's cells hold more than the surface encloses.
-        curved: the same of the cells that are solved.
-    """
-
-    took: list[float] = field(default_factory=list)
-    cells: int = 0
+    took: list[float] = field(default_factory=list)  #: s of the processor of each.
+    cells: int = 0  #: of the last.
     flat: list[float] = field(default_factory=list)
-    curved: list[float] = field(default_factory=list)
+    """relative, by which each one's cells hold more than the surface encloses."""
+    curved: list[float] = field(default_factory=list)  #: the same of the cells that are solved.
 
     def add(self, mesh: Mesh, edge: float, fill: Callable[[Mesh, float], Filled]) -> None:
         """Fill once more."""

@@ -56,19 +56,12 @@ Solved = Callable[[], FloatArray]
 
 @dataclass(frozen=True)
 class Point:
-    """One setting.
+    """One setting."""
 
-    Attributes:
-        family: which curve.
-        unknowns: of the system; of modes kept, their number.
-        seconds: process seconds, one a run.
-        error: relative, or of sounds in dB.
-    """
-
-    family: str
-    unknowns: int
-    seconds: tuple[float, ...]
-    error: float
+    family: str  #: which curve.
+    unknowns: int  #: of the system; of modes kept, their number.
+    seconds: tuple[float, ...]  #: process seconds, one a run.
+    error: float  #: relative, or of sounds in dB.
 
     @property
     def median(self) -> float:

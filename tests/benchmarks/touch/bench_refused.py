@@ -56,35 +56,21 @@ _OWN = (SPACING, ROUNDS, SAMPLES, BLOCK)
 
 @dataclass(frozen=True)
 class CheckedAnswer:
-    """One answer, or refusal, of some contacts of a run.
+    """One answer, or refusal, of some contacts of a run."""
 
-    Attributes:
-        object: its name.
-        seed: of the run.
-        spacing: of its contacts.
-        model: name of the object that it was answered by.
-        sense: that answered.
-        level: which dial was turned, and to what.
-        contacts: how many were used.
-        first: the first of them, from 0.
-        refusal: the program's sentence; empty where it answered.
-        error: m, of the last of them; None where it was refused.
-        inside: whether the truth is in the region of 90 %.
-        fits: nats of the contacts' own fits at the answer; None for one that was not used.
-    """
-
-    object: str
-    seed: int
-    spacing: str
-    model: str
-    sense: Senses
-    level: str
-    contacts: int
-    first: int
-    refusal: str
-    error: float | None
-    inside: bool
+    object: str  #: its name.
+    seed: int  #: of the run.
+    spacing: str  #: of its contacts.
+    model: str  #: name of the object that it was answered by.
+    sense: Senses  #: that answered.
+    level: str  #: which dial was turned, and to what.
+    contacts: int  #: how many were used.
+    first: int  #: the first of them, from 0.
+    refusal: str  #: the program's sentence; empty where it answered.
+    error: float | None  #: m, of the last of them; None where it was refused.
+    inside: bool  #: whether the truth is in the region of 90 %.
     fits: tuple[float | None, ...]
+    """nats of the contacts' own fits at the answer; None for one that was not used."""
 
 
 def settings(sense: Senses) -> Mapping[str, Setting]:
@@ -160,19 +146,12 @@ def _checked(
 
 @dataclass(frozen=True)
 class Choice:
-    """What is answered of every run.
+    """What is answered of every run."""
 
-    Attributes:
-        spacing: of the contacts.
-        senses: that answer.
-        levels: that are answered at; none for all.
-        another: whether the next object's model answers in place of the run's own.
-    """
-
-    spacing: str
-    senses: Collection[Senses]
-    levels: Collection[str]
-    another: bool
+    spacing: str  #: of the contacts.
+    senses: Collection[Senses]  #: that answer.
+    levels: Collection[str]  #: that are answered at; none for all.
+    another: bool  #: whether the next object's model answers in place of the run's own.
 
 
 def checked_runs(

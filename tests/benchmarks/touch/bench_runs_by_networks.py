@@ -39,27 +39,16 @@ _REPEATS = 3
 
 @dataclass(frozen=True)
 class AnsweredRun:
-    """One run, answered at one choice of levels by one sense.
+    """One run, answered at one choice of levels by one sense."""
 
-    Attributes:
-        object: its name.
-        seed: of the run.
-        spacing: of its contacts.
-        levels: a key of ``LEVELS``.
-        sense: that answered.
-        error: m, of the last contact.
-        inside: whether the truth is in the region of 90 %.
-        seconds: of CPU, of readings and answer.
-    """
-
-    object: str
-    seed: int
-    spacing: str
-    levels: str
-    sense: str
-    error: float
-    inside: bool
-    seconds: float
+    object: str  #: its name.
+    seed: int  #: of the run.
+    spacing: str  #: of its contacts.
+    levels: str  #: a key of ``LEVELS``.
+    sense: str  #: that answered.
+    error: float  #: m, of the last contact.
+    inside: bool  #: whether the truth is in the region of 90 %.
+    seconds: float  #: of CPU, of readings and answer.
 
 
 def answered(case: Case) -> Iterator[AnsweredRun]:

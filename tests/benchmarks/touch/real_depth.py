@@ -34,29 +34,17 @@ CONSOLE = Console(width=118, highlight=False)
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """One held-out press.
+    """One held-out press."""
 
-    Attributes:
-        name: of its picture.
-        image: ``(rows, columns, 3)``.
-        height: ``(rows, columns)`` metres, read.
-        ball: the sphere under it.
-        once: metres, RMSE of the single reading by the smooth model.
-        covered: share of the compared pixels whose slope is trusted.
-        scores: ``(n,)`` errors in units of their stated standard deviation.
-        stated: metres, rms of that standard deviation.
-        seconds: of the processor: reading, and stating its error.
-    """
-
-    name: str
-    image: ByteArray
-    height: FloatArray
-    ball: BallFit
-    once: float
-    covered: float
-    scores: FloatArray
-    stated: float
-    seconds: tuple[float, float]
+    name: str  #: of its picture.
+    image: ByteArray  #: ``(rows, columns, 3)``.
+    height: FloatArray  #: ``(rows, columns)`` metres, read.
+    ball: BallFit  #: the sphere under it.
+    once: float  #: metres, RMSE of the single reading by the smooth model.
+    covered: float  #: share of the compared pixels whose slope is trusted.
+    scores: FloatArray  #: ``(n,)`` errors in units of their stated standard deviation.
+    stated: float  #: metres, rms of that standard deviation.
+    seconds: tuple[float, float]  #: of the processor: reading, and stating its error.
 
 
 def main() -> None:

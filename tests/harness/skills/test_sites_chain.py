@@ -44,17 +44,12 @@ def sites(count: int, steps: Steps, visit: Visit | None, seed: int = 1) -> tuple
 
 @dataclass
 class Asked:
-    """A visit that goes anywhere, up to a given number of contacts the first times it is asked.
+    """A visit that goes anywhere, up to a given number of contacts the first times it is asked."""
 
-    Attributes:
-        stuck: contacts beyond which there is no way until the chain was cut back to ``back`` contacts.
-        back: see ``stuck``.
-        befores: what it was asked, whether it said yes, whether it was to be patient.
-    """
-
-    stuck: int
-    back: int
+    stuck: int  #: contacts beyond which there is no way until the chain was cut back to ``back`` contacts.
+    back: int  #: see ``stuck``.
     befores: list[tuple[int, bool, bool]] = field(default_factory=list)
+    """what it was asked, whether it said yes, whether it was to be patient."""
 
     def __call__(self, before: int, base_from_gel: FloatArray, patient: bool) -> bool:
         freed = any(b <= self.back for b, _, asked_patiently in self.befores if asked_patiently)

@@ -20,15 +20,10 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Variant:
-    """A way to compute.
+    """A way to compute."""
 
-    Attributes:
-        name: of Mitsuba's.
-        because: why it was taken, in words.
-    """
-
-    name: str
-    because: str
+    name: str  #: of Mitsuba's.
+    because: str  #: why it was taken, in words.
 
 
 @functools.cache

@@ -28,23 +28,14 @@ _DIRECT = 2
 
 @dataclass(frozen=True, eq=False)
 class TracedImage:
-    """A picture with what is known of it.
+    """A picture with what is known of it."""
 
-    Attributes:
-        image: linear light, coverage and depth.
-        noise: linear light, root mean square over pixels and channels, of the picture's mean.
-        alpha_noise: the same of coverage.
-        samples: a pixel, of both seeds together.
-        variant: of Mitsuba, and why.
-        seconds: by what was done; the first picture of a kind is compiled in its time.
-    """
-
-    image: LinearImage
-    noise: float
-    alpha_noise: float
-    samples: int
-    variant: Variant
-    seconds: Mapping[str, float]
+    image: LinearImage  #: linear light, coverage and depth.
+    noise: float  #: linear light, root mean square over pixels and channels, of the picture's mean.
+    alpha_noise: float  #: the same of coverage.
+    samples: int  #: a pixel, of both seeds together.
+    variant: Variant  #: of Mitsuba, and why.
+    seconds: Mapping[str, float]  #: by what was done; the first picture of a kind is compiled in its time.
 
 
 class PathTraced:

@@ -34,17 +34,11 @@ _SAID_EVERY = 10.0
 
 @dataclass(frozen=True, eq=False)
 class SizeSamples:
-    """Readings of shapes of known size.
+    """Readings of shapes of known size."""
 
-    Attributes:
-        inputs: by their name in the graph, ``(n, ...)`` each.
-        sizes: ``(n,)`` m.
-        shapes: ``(n,)`` number of the shape that each is of.
-    """
-
-    inputs: dict[str, AnyArray]
-    sizes: FloatArray
-    shapes: IntArray
+    inputs: dict[str, AnyArray]  #: by their name in the graph, ``(n, ...)`` each.
+    sizes: FloatArray  #: ``(n,)`` m.
+    shapes: IntArray  #: ``(n,)`` number of the shape that each is of.
 
     def of(self, rows: AnyArray) -> "SizeSamples":
         """Some of them."""

@@ -30,17 +30,11 @@ _TRAIN = "python -m experiments.shape_reconstruction.pcn.train --profile paper -
 
 @dataclass(frozen=True, eq=False)
 class PaperCompletion:
-    """A trained network.
+    """A trained network."""
 
-    Attributes:
-        sense: of ``INPUTS``.
-        network: that runs it.
-        card: where it comes from and what it reaches.
-    """
-
-    sense: str
-    network: Network
-    card: Mapping[str, object]
+    sense: str  #: of ``INPUTS``.
+    network: Network  #: that runs it.
+    card: Mapping[str, object]  #: where it comes from and what it reaches.
 
     def answered(self, evidence: ShapeEvidence) -> PointEstimate:
         """``(DENSE, 3)`` m all over the object.

@@ -6,21 +6,13 @@ from types import MappingProxyType
 
 @dataclass(frozen=True)
 class CompletionProfile:
-    """How much is drawn and for how long it is learnt.
+    """How much is drawn and for how long it is learnt."""
 
-    Attributes:
-        shapes: drawn; a tenth of them is held out.
-        sets: of touches of each.
-        steps: of the fit.
-        batch: sets a step.
-        compared: points at a step, of those given and of those all over a shape.
-    """
-
-    shapes: int
-    sets: int
-    steps: int
-    batch: int = 12
-    compared: int = 1024
+    shapes: int  #: drawn; a tenth of them is held out.
+    sets: int  #: of touches of each.
+    steps: int  #: of the fit.
+    batch: int = 12  #: sets a step.
+    compared: int = 1024  #: points at a step, of those given and of those all over a shape.
 
 
 PROFILES = MappingProxyType(

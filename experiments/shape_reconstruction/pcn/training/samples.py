@@ -26,19 +26,12 @@ WHOLE = 2048
 
 @dataclass(frozen=True, eq=False)
 class TouchSets:
-    """What the network learns from; all in its own frame.
+    """What the network learns from; all in its own frame."""
 
-    Attributes:
-        touched: ``(n, TAKEN, 3)`` float32.
-        whole: ``(n, WHOLE, 3)`` float32, in the same frame as what was touched.
-        reach: ``(n,)`` m for one of the frame's units.
-        shapes: ``(n,)`` number of the shape that each is of.
-    """
-
-    touched: AnyArray
-    whole: AnyArray
-    reach: FloatArray
-    shapes: IntArray
+    touched: AnyArray  #: ``(n, TAKEN, 3)`` float32.
+    whole: AnyArray  #: ``(n, WHOLE, 3)`` float32, in the same frame as what was touched.
+    reach: FloatArray  #: ``(n,)`` m for one of the frame's units.
+    shapes: IntArray  #: ``(n,)`` number of the shape that each is of.
 
     def of(self, rows: AnyArray) -> "TouchSets":
         """Some of them."""

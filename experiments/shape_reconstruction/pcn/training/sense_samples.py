@@ -39,19 +39,12 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class SenseSamples:
-    """What the network of one sense learns from; all in its own frame.
+    """What the network of one sense learns from; all in its own frame."""
 
-    Attributes:
-        inputs: by name, ``(n, ...)``, points in float32, windows in uint8.
-        whole: ``(n, WHOLE, 3)`` float32.
-        reach: ``(n,)`` m for one of the frame's units.
-        shapes: ``(n,)`` number of the shape that each is of.
-    """
-
-    inputs: dict[str, AnyArray]
-    whole: AnyArray
-    reach: FloatArray
-    shapes: IntArray
+    inputs: dict[str, AnyArray]  #: by name, ``(n, ...)``, points in float32, windows in uint8.
+    whole: AnyArray  #: ``(n, WHOLE, 3)`` float32.
+    reach: FloatArray  #: ``(n,)`` m for one of the frame's units.
+    shapes: IntArray  #: ``(n,)`` number of the shape that each is of.
 
     def of(self, rows: AnyArray) -> "SenseSamples":
         """Some of them."""

@@ -42,15 +42,10 @@ _FROM_ONE_SIDE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class TouchedShape:
-    """A shape at its true size, standing on z = 0.
+    """A shape at its true size, standing on z = 0."""
 
-    Attributes:
-        mesh: m.
-        seed: of the places on it.
-    """
-
-    mesh: Mesh
-    seed: int
+    mesh: Mesh  #: m.
+    seed: int  #: of the places on it.
 
     @cached_property
     def dense(self) -> tuple[FloatArray, FloatArray]:

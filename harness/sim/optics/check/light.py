@@ -93,18 +93,13 @@ _STEEPEST = 0.8
 
 @dataclass(frozen=True)
 class SlopeFit:
-    """How well a change of colour is explained as a pressed gel's.
+    """How well a change of colour is explained as a pressed gel's."""
 
-    Attributes:
-        explained: share of the change, in grey levels squared, that slopes explain.
-        surface: share of those slopes, squared, that are one surface's gradient.
-        raised: -1 to 1: mean height of the changed blocks above the rest, over the mean of its size; 0 where
-            the rest does not go around the contact.
-    """
-
-    explained: float
-    surface: float
+    explained: float  #: share of the change, in grey levels squared, that slopes explain.
+    surface: float  #: share of those slopes, squared, that are one surface's gradient.
     raised: float
+    """-1 to 1: mean height of the changed blocks above the rest, over the mean of its size; 0 where the rest
+    does not go around the contact."""
 
 
 @dataclass(frozen=True, eq=False)

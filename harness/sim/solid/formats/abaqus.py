@@ -83,17 +83,11 @@ class _Instance:
 
 @dataclass(frozen=True)
 class _Keyword:
-    """A keyword line and where it is.
+    """A keyword line and where it is."""
 
-    Attributes:
-        name: in upper case, without its star.
-        options: values by their names in upper case; "" for an option without a value.
-        line: its number, from 1.
-    """
-
-    name: str
-    options: dict[str, str]
-    line: int
+    name: str  #: in upper case, without its star.
+    options: dict[str, str]  #: values by their names in upper case; "" for an option without a value.
+    line: int  #: its number, from 1.
 
 
 def read_abaqus(path: Path) -> CellFile:

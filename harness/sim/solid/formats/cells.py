@@ -11,34 +11,22 @@ from harness.basics.errors import MeshRefused
 
 @dataclass(frozen=True, eq=False)
 class CellBlock:
-    """Cells of one kind.
+    """Cells of one kind."""
 
-    Attributes:
-        type: kind of the cells by meshio's names, e.g. ``"tetra10"``.
-        data: ``(c, k)`` indices of nodes, from 0.
-    """
-
-    type: str
-    data: IntArray
+    type: str  #: kind of the cells by meshio's names, e.g. ``"tetra10"``.
+    data: IntArray  #: ``(c, k)`` indices of nodes, from 0.
 
 
 @dataclass(frozen=True, eq=False)
 class CellFile:
-    """Content of a file of finite elements.
+    """Content of a file of finite elements."""
 
-    Attributes:
-        points: ``(n, 2)`` or ``(n, 3)`` in the file's unit.
-        cells: blocks of cells in the order of the file.
-        point_sets: indices of nodes by the name of their set.
-        notes: what of the file is used or left out, a sentence each.
-        single: the file holds float32 coordinates.
-    """
-
-    points: FloatArray
-    cells: tuple[CellBlock, ...]
+    points: FloatArray  #: ``(n, 2)`` or ``(n, 3)`` in the file's unit.
+    cells: tuple[CellBlock, ...]  #: blocks of cells in the order of the file.
     point_sets: Mapping[str, IntArray] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
-    single: bool = False
+    """indices of nodes by the name of their set."""
+    notes: tuple[str, ...] = ()  #: what of the file is used or left out, a sentence each.
+    single: bool = False  #: the file holds float32 coordinates.
 
 
 def node_indices(named: IntArray, numbers: IntArray, order: IntArray, where: str) -> IntArray:

@@ -68,32 +68,20 @@ def read_collada(path: Path, colours: bool = False) -> MeshFile:
 
 @dataclass(frozen=True, eq=False)
 class _Material:
-    """A colour or a texture.
+    """A colour or a texture."""
 
-    Attributes:
-        tint: ``(3,)`` linear; None where the file states none.
-        picture: of the texture; None without one.
-        coordinates: name of the texture's coordinates, as the effect calls them.
-    """
-
-    tint: FloatArray | None
-    picture: TextureFile | None
-    coordinates: str
+    tint: FloatArray | None  #: ``(3,)`` linear; None where the file states none.
+    picture: TextureFile | None  #: of the texture; None without one.
+    coordinates: str  #: name of the texture's coordinates, as the effect calls them.
 
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """The triangles of one primitive, and of what they may be coloured.
+    """The triangles of one primitive, and of what they may be coloured."""
 
-    Attributes:
-        symbol: of the material, bound where the geometry is placed.
-        part: triangles, with the tints of the vertices.
-        coordinates: ``(m, 3, 2)`` texture places of each set.
-    """
-
-    symbol: str
-    part: MeshPart
-    coordinates: dict[int, FloatArray]
+    symbol: str  #: of the material, bound where the geometry is placed.
+    part: MeshPart  #: triangles, with the tints of the vertices.
+    coordinates: dict[int, FloatArray]  #: ``(m, 3, 2)`` texture places of each set.
 
 
 class _Reader:

@@ -53,17 +53,11 @@ _SMALL, _LARGE = (8, 8), (16, 4)
 
 @dataclass(frozen=True)
 class _Entry:
-    """A bulk data entry.
+    """A bulk data entry."""
 
-    Attributes:
-        name: in upper case, without its star.
-        fields: data fields of all its lines, stripped.
-        line: number of its first line, from 1.
-    """
-
-    name: str
-    fields: list[bytes]
-    line: int
+    name: str  #: in upper case, without its star.
+    fields: list[bytes]  #: data fields of all its lines, stripped.
+    line: int  #: number of its first line, from 1.
 
 
 @dataclass(frozen=True, eq=False)

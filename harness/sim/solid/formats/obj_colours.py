@@ -31,21 +31,14 @@ _WORD = re.compile(r"\s*(\S+)(?=\s)")
 
 @dataclass(eq=False)
 class _Material:
-    """A material of a library.
+    """A material of a library."""
 
-    Attributes:
-        tint: ``(3,)`` linear diffuse colour; None where none is stated.
-        picture: its texture; None without one.
-        scale: ``(2,)`` by which texture places are multiplied.
-        offset: ``(2,)`` that is added to them then.
-        clamps: whether the texture is not to repeat.
-    """
-
-    tint: FloatArray | None = None
-    picture: TextureFile | None = None
+    tint: FloatArray | None = None  #: ``(3,)`` linear diffuse colour; None where none is stated.
+    picture: TextureFile | None = None  #: its texture; None without one.
     scale: FloatArray = field(default_factory=lambda: np.ones(2))
-    offset: FloatArray = field(default_factory=lambda: np.zeros(2))
-    clamps: bool = False
+    """``(2,)`` by which texture places are multiplied."""
+    offset: FloatArray = field(default_factory=lambda: np.zeros(2))  #: ``(2,)`` that is added to them then.
+    clamps: bool = False  #: whether the texture is not to repeat.
 
 
 @dataclass(eq=False)

@@ -26,53 +26,36 @@ MAX_NODES = 200_000
 
 @dataclass(frozen=True, eq=False)
 class TextureFile:
-    """An encoded picture that a file names.
+    """An encoded picture that a file names."""
 
-    Attributes:
-        name: as the file states it.
-        read: returns its bytes; raises ``MeshRefused`` for a name outside the file's folder.
-    """
-
-    name: str
+    name: str  #: as the file states it.
     read: Callable[[], bytes]
+    """returns its bytes; raises ``MeshRefused`` for a name outside the file's folder."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshPart:
-    """Triangles of one material, placed in the file's frame.
+    """Triangles of one material, placed in the file's frame."""
 
-    Attributes:
-        vertices: ``(n, 3)`` in the file's unit.
-        faces: ``(m, 3)`` indices of vertices.
-        tints: ``(m, 3, 3)`` linear red, green, blue of each face's corners; None where the file states none.
-        places: ``(m, 3, 2)`` (u, v) of each face's corners, v upwards; None without a texture.
-        picture: texture that multiplies the tints; None without one.
-    """
-
-    vertices: FloatArray
-    faces: IntArray
+    vertices: FloatArray  #: ``(n, 3)`` in the file's unit.
+    faces: IntArray  #: ``(m, 3)`` indices of vertices.
     tints: FloatArray | None = None
+    """``(m, 3, 3)`` linear red, green, blue of each face's corners; None where the file states none."""
     places: FloatArray | None = None
-    picture: TextureFile | None = None
+    """``(m, 3, 2)`` (u, v) of each face's corners, v upwards; None without a texture."""
+    picture: TextureFile | None = None  #: texture that multiplies the tints; None without one.
 
 
 @dataclass(frozen=True, eq=False)
 class MeshFile:
-    """A mesh file's pieces, and what it declares.
+    """A mesh file's pieces, and what it declares."""
 
-    Attributes:
-        parts: at least one, with at least one triangle together.
-        metres: length of the file's unit in metres; None where neither file nor format states it.
-        up_axis: axis that points up; None where neither file nor format states it.
-        notes: content of the file that is not used, a sentence each.
-        colour_notes: the same about colours.
-    """
-
-    parts: tuple[MeshPart, ...]
+    parts: tuple[MeshPart, ...]  #: at least one, with at least one triangle together.
     metres: float | None = None
-    up_axis: Axis | None = None
-    notes: tuple[str, ...] = ()
-    colour_notes: tuple[str, ...] = ()
+    """length of the file's unit in metres; None where neither file nor format states it."""
+    up_axis: Axis | None = None  #: axis that points up; None where neither file nor format states it.
+    notes: tuple[str, ...] = ()  #: content of the file that is not used, a sentence each.
+    colour_notes: tuple[str, ...] = ()  #: the same about colours.
 
 
 def merge_parts(parts: tuple[MeshPart, ...]) -> tuple[FloatArray, IntArray]:

@@ -46,23 +46,16 @@ _Key = tuple[str, str]
 
 @dataclass(eq=False)
 class _Object:
-    """An object of a model part: a mesh, or components of other objects.
+    """An object of a model part: a mesh, or components of other objects."""
 
-    Attributes:
-        kind: its ``type``.
-        vertices: x, y and z of each vertex.
-        corners: three vertex indices of each triangle.
-        colours: of each triangle, its property group and the three entries in it; empty where none has any.
-        default: property group and entry of the object.
-        components: object and matrix each.
-    """
-
-    kind: str
-    vertices: "array[float]" = field(default_factory=lambda: array("d"))
+    kind: str  #: its ``type``.
+    vertices: "array[float]" = field(default_factory=lambda: array("d"))  #: x, y and z of each vertex.
     corners: "array[int]" = field(default_factory=lambda: array("q"))
+    """three vertex indices of each triangle."""
     colours: dict[int, tuple[str, int, int, int]] = field(default_factory=dict)
-    default: tuple[str, int] | None = None
-    components: list[tuple[_Key, FloatArray]] = field(default_factory=list)
+    """of each triangle, its property group and the three entries in it; empty where none has any."""
+    default: tuple[str, int] | None = None  #: property group and entry of the object.
+    components: list[tuple[_Key, FloatArray]] = field(default_factory=list)  #: object and matrix each.
 
 
 def read_3mf(path: Path, colours: bool = False) -> MeshFile:

@@ -25,30 +25,20 @@ Outline = Sequence[tuple[float, float]]
 
 @dataclass(frozen=True)
 class Cross:
-    """The horizontal section of a vessel: a superellipse.
+    """The horizontal section of a vessel: a superellipse."""
 
-    Attributes:
-        across: its extent in y over that in x.
-        power: 2 is an ellipse; greater is nearer to a rectangle.
-    """
-
-    across: float = 1.0
-    power: float = 2.0
+    across: float = 1.0  #: its extent in y over that in x.
+    power: float = 2.0  #: 2 is an ellipse; greater is nearer to a rectangle.
 
 
 @dataclass(frozen=True, eq=False)
 class Vessel:
-    """A vessel's grid.
+    """A vessel's grid."""
 
-    Attributes:
-        grid: that it is part of.
-        outside: ``(s, AROUND)`` nodes of its outer face, from the middle of the bottom up to the rim.
-        split: row of ``outside`` above which cells run up, and below which they run down.
-    """
-
-    grid: SolidGrid
+    grid: SolidGrid  #: that it is part of.
     outside: IntArray
-    split: int
+    """``(s, AROUND)`` nodes of its outer face, from the middle of the bottom up to the rim."""
+    split: int  #: row of ``outside`` above which cells run up, and below which they run down.
 
 
 def draw(family: str, random: _Random) -> HouseholdSolid:

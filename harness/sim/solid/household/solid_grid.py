@@ -20,13 +20,9 @@ _FLAT = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class HouseholdSolid:
-    """A body.
+    """A body."""
 
-    Attributes:
-        inside: its cells.
-    """
-
-    inside: Tetrahedra
+    inside: Tetrahedra  #: its cells.
 
     @property
     def surface(self) -> Mesh:
