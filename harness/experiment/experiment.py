@@ -211,7 +211,7 @@ class ErrorBound:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Procedure:
-    """A task of the arm at a bench, independent of the use of its readings: an experiment or a calibration."""
+    """A task of the arm at a bench, whatever its readings serve: an experiment or a calibration."""
 
     name: str  #: in run folders, and on the command line.
     step: str  #: what a step is called: ``"contact"``.
