@@ -251,11 +251,11 @@ def _about(press: UsedPress, made: MarkFree, pictures: Pictures) -> tuple[ByteAr
 def draw_press(calibration: TactileCalibration, centre: FloatArray, radius: float) -> ByteArray:
     """``(rows, columns, 3)`` RGB of a ball in the gel at a centre (column, row), drawn as anything is drawn.
 
-    With the gel's skirt; ``radius`` in pixels is the contact line's.
+    The smooth level, with the gel's skirt; ``radius`` in pixels is the contact line's.
     """
     header = calibration.header
     ball = header.ball_radius / header.pitch
     away = distance((calibration.rows, calibration.columns), centre)
     reached = header.pitch * pressed_ball(away, depth_of(header.skirt, radius, ball), ball)
-    drawn: ByteArray = Optics(calibration, "fast").render(deform(reached[None], header.skirt)).images[0]
+    drawn: ByteArray = Optics(calibration, "smooth").render(deform(reached[None], header.skirt)).images[0]
     return drawn

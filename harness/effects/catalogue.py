@@ -35,15 +35,7 @@ Levels = Mapping[str, Level]
 
 SUPERSAMPLING = Knob("touch.supersampling", (1, 2, 3), "rays a side", "number", 1, "rays a pixel, each way")
 GEL = Knob("touch.gel", ("fast", "exact"), "", "method", "exact", "how wide blurs of the gel are done")
-OPTICS = Knob(
-    "touch.optics",
-    ("fast", "exact"),
-    "",
-    "method",
-    "fast",
-    "slope to colour",
-    removed={"smooth": "use touch.optics=fast"},
-)
+OPTICS = Knob("touch.optics", ("smooth", "fast", "exact"), "", "method", "fast", "slope to colour")
 MARKER_NODES = Knob("touch.marker_motion", (2, 4, 8), "nodes", "number", 4, "loads to one gel thickness")
 
 

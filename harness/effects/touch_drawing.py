@@ -11,7 +11,7 @@ from harness.sim.gel.height_map import RasterMesh, height_maps, penetration, res
 from harness.sim.optics.optics import Optics, OpticsLevel
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
-_OPTICS: dict[str, OpticsLevel] = {"exact": "exact", "fast": "fast"}
+_OPTICS: dict[str, OpticsLevel] = {"exact": "exact", "fast": "fast", "smooth": "smooth"}
 
 
 def reached(
@@ -53,9 +53,12 @@ def optics(
 
     Args:
         calibration: of the colours.
-        level: ``"exact"`` or ``"fast"``.
+        level: ``"exact"``, ``"fast"`` or ``"smooth"``.
         sensor: gives the untouched gel where ``towards`` does not.
         towards: ``(rows, columns)`` metres towards the camera, the gel's own surface; None for the sensor's.
+
+    Raises:
+        CalibrationRefused: a level that the calibration does not have.
     """
     return _optics(calibration, _OPTICS[level], sensor, _Rest(towards))
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.oracles.smooth_optics import SmoothOptics
+from harness.sim.optics.optics import Optics
 from tests.samples.real_press import R15, drawing, fitted, held_out_presses, judged, set_of
 
 
@@ -24,7 +24,7 @@ def test_presses_of_the_papers_sensor_are_drawn_over_the_whole_frame(shared_data
     frame, contact, nothing = [], [], []
     for press in takewhile(of_one_fold, held_out_presses(pictures, R15)):
         skirt = press.calibration.header.skirt
-        drawn = fitted(press, drawing(SmoothOptics(press.calibration), skirt), skirt)
+        drawn = fitted(press, drawing(Optics(press.calibration, "smooth"), skirt), skirt)
         frame.append(drawn.frame)
         contact.append(drawn.contact)
         nothing.append(judged(press, pictures.background.astype(float), drawn.pose).frame)

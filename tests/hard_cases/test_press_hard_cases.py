@@ -112,7 +112,7 @@ def test_a_contact_at_the_corner_is_drawn_and_said() -> None:
     assert not np.array_equal(press.image[:15, :15], PLAIN.calibration.background[:15, :15])
 
 
-@pytest.mark.parametrize("level", ["exact", "fast"])
+@pytest.mark.parametrize("level", ["exact", "fast", "smooth"])
 def test_a_flat_face_is_coloured_as_the_untouched_gel_in_any_pose(level: str) -> None:
     box = trimesh.creation.box(extents=(6e-3, 6e-3, 40e-3))
     turn = rotation_about(np.array([0.6, 0.8, 0.0]), 0.3)

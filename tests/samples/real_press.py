@@ -20,7 +20,6 @@ from harness.sim.gel.gel import R15_SKIRT, GelSkirt, deform
 from harness.sim.optics.lit_calibration import LitCalibration
 from harness.sim.optics.optics import Optics
 from harness.sim.optics.shadow import ShadowTable
-from tests.oracles.smooth_optics import SmoothOptics
 
 R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)
 FOTS = Identity("GelSight", "FOTS", "MIT", "2026-01-01", 1e-3 / 19.58, 2.35e-3)
@@ -115,7 +114,7 @@ def held_out_presses(pictures: Pictures, who: Identity, folds: int = FOLDS) -> I
             yield HeldOut(name, pack.images[k], model, calibration, start, who.ball, drift, shadow)
 
 
-def drawing(optics: Optics | SmoothOptics, skirt: GelSkirt) -> Drawing:
+def drawing(optics: Optics, skirt: GelSkirt) -> Drawing:
     """A drawing by the simulator: the gel's skirt, then its colours."""
 
     def draw(reached: FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@ import numpy.typing as npt
 
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.compiled import compiled, compiled_fast
+from harness.sim.optics.shading import at_pixel, at_row, colour, softly_limited
 from harness.sim.optics.tactile_calibration import Float32Array
 
 GRID = 2.0**20
@@ -98,6 +99,112 @@ def draw_exactly(
                 beyond += 1
             clipped += _to_bytes(base[i, j], out, image[i, j])
     return clipped, beyond
+
+
+@compiled
+def _normal(z: FloatArray, i: int, j: int, limit: float) -> tuple[float, float, float]:
+    """Steepness of a pixel, and the image part of its normal, bent towards the limit."""
+    a, b = _slopes(z, i, j)
+    steep: float = np.hypot(a, b)
+    if steep == 0.0:
+        return steep, 0.0, 0.0
+    sine = steep / np.sqrt(1.0 + steep * steep)
+    scale = softly_limited(sine, limit) / steep
+    return steep, -b * scale, -a * scale
+
+
+@compiled
+def _smooth_pixel(
+    z: FloatArray,
+    i: int,
+    j: int,
+    row: FloatArray,
+    limit: float,
+    here: FloatArray,
+    out: FloatArray,
+) -> float:
+    steep, nx, ny = _normal(z, i, j, limit)
+    if steep == 0.0:
+        out[:] = 0.0
+        return steep
+    at_pixel(row, j, z.shape[1], here)
+    colour(here, nx, ny, out)
+    return steep
+
+
+@compiled
+def change_smoothly(z: FloatArray, smooth: FloatArray, limit: float, change: FloatArray) -> None:
+    """Write the polynomial's grey levels ``(rows, columns, 3)`` for a surface ``z`` in pixels."""
+    row, here = np.empty((3, 60)), np.empty(60)
+    for i in range(z.shape[0]):
+        at_row(smooth, i, z.shape[0], row)
+        for j in range(z.shape[1]):
+            _smooth_pixel(z, i, j, row, limit, here, change[i, j])
+
+
+@compiled
+def draw_smoothly(
+    z: FloatArray,
+    pressed: FloatArray,
+    smooth: FloatArray,
+    light: FloatArray,
+    base: FloatArray,
+    limit: float,
+    image: ByteArray,
+) -> tuple[int, int]:
+    """As ``draw_exactly`` with the polynomial, and the light of ``harness.sim.optics.lit_calibration``.
+
+    Args:
+        z: ``(rows, columns)`` heights in pixels.
+        pressed: ``(rows, columns)`` pixels, of indentation.
+        smooth: ``(120, 3)`` coefficients of the slopes.
+        light: ``(36, 3)`` of the light, grey levels a pixel of indentation; ``(0, 3)`` for none.
+        base: ``(rows, columns, 3)``.
+        limit: sine of the steepest slope supported.
+        image: ``(rows, columns, 3)``, overwritten.
+    """
+    rows, columns = z.shape
+    steepest = limit / np.sqrt(1.0 - limit * limit) if limit < 1.0 else np.inf
+    clipped, beyond = 0, 0
+    row, here, out = np.empty((3, 60)), np.empty(60), np.empty(3)
+    light_row = np.empty((3, len(light) // 2))
+    for i in range(rows):
+        at_row(smooth, i, rows, row)
+        _light_at_row(light, i, rows, light_row)
+        for j in range(columns):
+            if _smooth_pixel(z, i, j, row, limit, here, out) > steepest:
+                beyond += 1
+            if len(light) and pressed[i, j] != 0.0:
+                _, nx, ny = _normal(z, i, j, limit)
+                _add_light(light_row, 2.0 * (j + 0.5) / columns - 1.0, nx, ny, pressed[i, j], out)
+            clipped += _to_bytes(base[i, j], out, image[i, j])
+    return clipped, beyond
+
+
+@compiled
+def _light_at_row(light: FloatArray, i: int, rows: int, out: FloatArray) -> None:
+    # As at_row: (3, 18), powers of the scaled column by power of the normal and channel.
+    v = 2.0 * (i + 0.5) / rows - 1.0
+    for k in range(len(light) // 6):
+        at = k * 6
+        for c in range(3):
+            out[0, k * 3 + c] = light[at, c] + v * (light[at + 1, c] + v * light[at + 2, c])
+            out[1, k * 3 + c] = light[at + 3, c] + v * light[at + 4, c]
+            out[2, k * 3 + c] = light[at + 5, c]
+
+
+@compiled
+def _add_light(row: FloatArray, u: float, nx: float, ny: float, pressed: float, out: FloatArray) -> None:
+    for c in range(3):
+        one, y, yy, x, xy, xx = (
+            row[0, c] + u * (row[1, c] + u * row[2, c]),
+            row[0, 3 + c] + u * (row[1, 3 + c] + u * row[2, 3 + c]),
+            row[0, 6 + c] + u * (row[1, 6 + c] + u * row[2, 6 + c]),
+            row[0, 9 + c] + u * (row[1, 9 + c] + u * row[2, 9 + c]),
+            row[0, 12 + c] + u * (row[1, 12 + c] + u * row[2, 12 + c]),
+            row[0, 15 + c] + u * (row[1, 15 + c] + u * row[2, 15 + c]),
+        )
+        out[c] += pressed * (one + ny * (y + ny * yy) + nx * (x + ny * xy + nx * xx))
 
 
 @compiled

@@ -1,10 +1,11 @@
-"""What the camera behind the gel sees: colour from slope, at two levels.
+"""What the camera behind the gel sees: colour from slope, at three levels.
 
 ``exact`` is Taxim's table in double precision; ``fast`` the same table in single precision
 with a polynomial for the arctangent (a pixel differs where its slope lies on the edge of a bin,
-and then by the table's own step).
-Both add to the background the change against the untouched gel, so that no contact
-gives the background bit for bit. Both see the same surface, held to a grid far below any sensor's noise
+and then by the table's own step); ``smooth`` the polynomial of ``harness.sim.optics.shading``, without bins,
+and with the light of a press where the calibration has it (``harness.sim.optics.lit_calibration``).
+All of them add to the background the change against the untouched gel, so that no contact
+gives the background bit for bit. All see the same surface, held to a grid far below any sensor's noise
 (``harness.sim.optics.kernels.GRID``), so that rounding chooses no colour.
 """
 
@@ -15,20 +16,22 @@ from typing import Literal
 import numpy as np
 
 from harness.basics.arrays import AnyArray, ByteArray, FloatArray, IntArray, read_only
-from harness.basics.errors import OutOfDomain
+from harness.basics.errors import CalibrationRefused, OutOfDomain
 from harness.sim.optics.kernels import (
     PADDED,
     change_exactly,
     change_fast,
+    change_smoothly,
     draw_exactly,
     draw_fast,
+    draw_smoothly,
     padded,
     to_pixels,
 )
 from harness.sim.optics.lit_calibration import LitCalibration
 from harness.sim.optics.tactile_calibration import Float32Array, TactileCalibration
 
-OpticsLevel = Literal["exact", "fast"]
+OpticsLevel = Literal["exact", "fast", "smooth"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +53,8 @@ class Optics:
         rest: ``(rows, columns)`` metres, the untouched gel's height towards the camera; flat if None.
 
     Raises:
-        OutOfDomain: an unknown level; a rest surface of another shape, or not finite.
+        CalibrationRefused: ``smooth`` was asked of a calibration that has only a table.
+        OutOfDomain: a rest surface of another shape, or not finite.
     """
 
     calibration: TactileCalibration
@@ -60,8 +64,12 @@ class Optics:
         self, calibration: TactileCalibration, level: OpticsLevel, rest: FloatArray | None = None
     ) -> None:
         shape = calibration.background.shape[:2]
-        if level not in ("exact", "fast"):
-            raise OutOfDomain(f"no optics level {level!r}; there are exact and fast")
+        if level not in ("exact", "fast", "smooth"):
+            raise OutOfDomain(f"no optics level {level!r}; there are exact, fast, smooth")
+        if level == "smooth" and len(calibration.smooth) == 0:
+            raise CalibrationRefused(
+                "this calibration has no smooth model; ask for exact or fast, or fit it again"
+            )
         if rest is not None and (rest.shape != shape or not np.isfinite(rest).all()):
             raise OutOfDomain(f"the rest surface is {rest.shape}, not finite or not the camera's {shape}")
         self.calibration = calibration
@@ -92,10 +100,14 @@ class Optics:
         return surface
 
     def _draw(self, z: FloatArray, image: ByteArray) -> tuple[int, int]:
+        known = self.calibration
         if self.level == "exact":
             return draw_exactly(z, self._table, self._base, self._steepest, image)
-        bins = self.calibration.bins
-        return draw_fast(z, bins, self._padded, self._base_fast, self._steepest, image)
+        if self.level == "fast":
+            return draw_fast(z, known.bins, self._padded, self._base_fast, self._steepest, image)
+        light = known.light * known.header.pitch if isinstance(known, LitCalibration) else np.empty((0, 3))
+        limit, pressed = known.header.slope_limit, z - self._untouched
+        return draw_smoothly(z, pressed, self._slopes, light, self._base, limit, image)
 
     @property
     def _steepest(self) -> float:
@@ -110,6 +122,11 @@ class Optics:
     def _padded(self) -> Float32Array:
         return padded(self.calibration.table)
 
+    @property
+    def _slopes(self) -> FloatArray:
+        known = self.calibration
+        return known.slopes if isinstance(known, LitCalibration) else known.smooth
+
     @cached_property
     def _untouched(self) -> FloatArray:
         return self._surface(np.zeros_like(self._rest))
@@ -118,7 +135,11 @@ class Optics:
     def _base(self) -> FloatArray:
         # Background less what the untouched gel's own slope would add: no contact adds it back.
         change = np.empty(self.calibration.background.shape)
-        change_exactly(self._untouched, self._table, change)
+        z = self._untouched
+        if self.level == "exact":
+            change_exactly(z, self._table, change)
+        else:
+            change_smoothly(z, self._slopes, self.calibration.header.slope_limit, change)
         base: FloatArray = self.calibration.background - change
         return base
 

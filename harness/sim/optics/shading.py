@@ -2,7 +2,8 @@
 
 ``dI = sum_ab sum_cd k_abcd nx^a ny^b u^c v^d`` with 1 <= a + b <= 5 and c + d <= 2: no constant
 in the normal, so a flat gel changes no colour. (nx, ny) is the part in the image plane of
-the unit normal towards the camera, (u, v) the position scaled to -1..1 on the image.
+the unit normal towards the camera, (u, v) the position scaled to -1..1 on the image. Beyond
+the slopes that presses supported the normal is bent smoothly towards the limit.
 """
 
 import numpy as np
@@ -12,7 +13,7 @@ from harness.basics.compiled import compiled
 from harness.sim.optics.tactile_calibration import NORMAL_DEGREE, POSITION_DEGREE
 
 KNEE = 0.9
-"""Share of the slope limit up to which a fit takes a slope as it is; beyond, it is bent towards the limit."""
+"""Share of the slope limit up to which a slope is taken as it is."""
 
 NORMAL_TERMS = (NORMAL_DEGREE + 1) * (NORMAL_DEGREE + 2) // 2 - 1
 POSITION_TERMS = (POSITION_DEGREE + 1) * (POSITION_DEGREE + 2) // 2
@@ -63,11 +64,23 @@ def at_pixel(row: FloatArray, j: int, columns: int, out: FloatArray) -> None:
 
 
 @compiled
-def colour_and_slope(here: FloatArray, nx: float, ny: float, out: FloatArray, by: FloatArray) -> None:
-    """Write the change of colour ``(3,)`` of a normal, by Horner's rule over ``at_pixel``'s terms.
+def colour(here: FloatArray, nx: float, ny: float, out: FloatArray) -> None:
+    """Write the change of colour ``(3,)`` of a normal, by Horner's rule over ``at_pixel``'s terms."""
+    for c in range(3):
+        k = NORMAL_TERMS
+        total = 0.0
+        for a in range(NORMAL_DEGREE, -1, -1):
+            inner = 0.0
+            for _ in range(NORMAL_DEGREE + 1 - a):
+                k -= 1
+                inner = inner * ny + (here[k * 3 + c] if k >= 0 else 0.0)
+            total = total * nx + inner
+        out[c] = total
 
-    Its derivatives by nx and ny go into ``by``, ``(3, 2)``.
-    """
+
+@compiled
+def colour_and_slope(here: FloatArray, nx: float, ny: float, out: FloatArray, by: FloatArray) -> None:
+    """As ``colour``, and the derivatives by nx and ny into ``by``, ``(3, 2)``."""
     for c in range(3):
         k = NORMAL_TERMS
         total, total_x, total_y = 0.0, 0.0, 0.0
@@ -81,6 +94,17 @@ def colour_and_slope(here: FloatArray, nx: float, ny: float, out: FloatArray, by
             total_y = total_y * nx + inner_y
             total = total * nx + inner
         out[c], by[c, 0], by[c, 1] = total, total_x, total_y
+
+
+@compiled
+def softly_limited(sine: float, limit: float) -> float:
+    """The sine of a slope, bent towards ``limit`` beyond the knee; once differentiable, increasing."""
+    knee = KNEE * limit
+    if sine <= knee:
+        return sine
+    room = limit - knee
+    bent: float = knee + room * (1.0 - np.exp(-(sine - knee) / room))
+    return bent
 
 
 @compiled

@@ -27,7 +27,7 @@ pytestmark = pytest.mark.benchmark
 
 CONTACTS = 48
 DEPTH = 1e-3
-LEVELS: tuple[OpticsLevel, ...] = ("exact", "fast")
+LEVELS: tuple[OpticsLevel, ...] = ("exact", "fast", "smooth")
 
 
 def _timed(work: Callable[[int], object], repeats: int) -> FloatArray:

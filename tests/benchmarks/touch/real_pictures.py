@@ -23,7 +23,6 @@ from harness.sim.gel.gel import R15_SKIRT, deform
 from harness.sim.optics.optics import Optics, OpticsLevel
 from harness.sim.optics.published_pack import PublishedPack, read_published
 from harness.sim.optics.shadow_image import darkening
-from tests.oracles.smooth_optics import SmoothOptics
 from tests.samples.real_press import (
     FOTS,
     R15,
@@ -39,8 +38,7 @@ from tests.samples.real_press import (
 from tests.support.real_data import WHY_NOT, find_shared_data
 
 CONSOLE = Console(width=118, highlight=False)
-LEVELS: tuple[OpticsLevel, ...] = ("fast", "exact")
-SMOOTH = "smooth"
+LEVELS: tuple[OpticsLevel, ...] = ("smooth", "fast", "exact")
 
 NOTHING, OWN_NOTHING = "background alone: the one picture of it", "background alone: as taught"
 PUBLISHED = "published table, dome and skirt (fitted to these presses)"
@@ -90,7 +88,7 @@ def _measure(
         f"score {20.0 * np.log10(255.0 / noise):.1f} dB\n"
     )
     if options.picture is not None:
-        _draw(presses, rows[TAUGHT.format(SMOOTH)], options.picture)
+        _draw(presses, rows[TAUGHT.format("smooth")], options.picture)
 
 
 def _drawn(press: HeldOut, background: ByteArray, pack: PublishedPack | None) -> dict[str, Drawn]:
@@ -105,10 +103,10 @@ def _drawn(press: HeldOut, background: ByteArray, pack: PublishedPack | None) ->
         answers[PUBLISHED] = fitted(press, drawing(optics, pack.calibration.header.skirt), R15_SKIRT)
         before = Optics(over_background(press.calibration, background), "fast")
         answers[BEFORE] = fitted(press, drawing(before, R15_SKIRT), R15_SKIRT)
-    answers[TAUGHT.format(SMOOTH)] = fitted(press, drawing(SmoothOptics(press.calibration), skirt), skirt)
     for level in LEVELS:
-        answers[TAUGHT.format(level)] = fitted(press, drawing(Optics(press.calibration, level), skirt), skirt)
-    best = answers[TAUGHT.format(SMOOTH)]
+        optics = Optics(press.calibration, level)
+        answers[TAUGHT.format(level)] = fitted(press, drawing(optics, skirt), skirt)
+    best = answers[TAUGHT.format("smooth")]
     answers[SHADED] = judged(press, best.image - _shadow(press, best), best.pose)
     answers[LIT] = judged(press, best.image + press.drift, best.pose)
     return answers
@@ -143,8 +141,8 @@ def _report(title: str, rows: dict[str, list[Drawn]]) -> None:
         texts = [f"{np.median(values):.2f} ({np.percentile(values, 10):.2f})" for values in columns]
         table.add_row(name, *texts, f"{np.median([one.alike for one in drawn]):.3f}")
     CONSOLE.print(table)
-    smooth = rows[TAUGHT.format(SMOOTH)]
-    for level in LEVELS:
+    smooth = rows[TAUGHT.format("smooth")]
+    for level in LEVELS[1:]:
         other = rows[TAUGHT.format(level)]
         pairs = list(zip(smooth, other, strict=True))
         better = [sum(getattr(a, of) > getattr(b, of) for a, b in pairs) for of in ("contact", "frame")]

@@ -20,9 +20,8 @@ from calibration.taxim.smooth_fit import distance
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused
 from harness.sim.gel.gel import GelSkirt, deform
-from harness.sim.optics.shading import design, scaled_position
+from harness.sim.optics.shading import design, scaled_position, softly_limited
 from harness.sim.optics.tactile_calibration import smooth_terms
-from tests.oracles.smooth_optics import softly_limited
 from tests.samples.drawn_presses import BALL, COLUMNS, CONTACT, ROWS, spread_centres
 
 TRUE = skirt_of(4.0 * CONTACT, 0.5)
@@ -43,7 +42,7 @@ def _drawn(skirt: GelSkirt, count: int = 20) -> tuple[PressPack, FloatArray, Flo
         surface = deform(reached[None], skirt)[0]
         down, right = (np.pad(np.gradient(surface)[axis][1:-1, 1:-1], 1, mode="edge") for axis in (0, 1))
         steep = np.hypot(down, right)
-        bent = softly_limited(steep / np.hypot(1.0, steep), CONTACT / BALL)
+        bent = np.vectorize(softly_limited)(steep / np.hypot(1.0, steep), CONTACT / BALL)
         normal = -np.stack([right, down], axis=-1) * (bent / np.maximum(steep, 1e-12))[..., None]
         shades = design(normal.reshape(-1, 2), where) @ smooth + surface.reshape(-1, 1) * DIMMING
         change[k] = shades.reshape(ROWS, COLUMNS, 3) + noise.normal(0.0, 1.0, (ROWS, COLUMNS, 3))

@@ -83,7 +83,7 @@ def test_the_artefact_draws_a_press_it_has_never_seen(twenty: tuple[Pictures, Fl
 
 def test_the_untouched_gel_is_the_background(twenty: tuple[Pictures, FloatArray, MarkFree]) -> None:
     made = twenty[2]
-    levels: tuple[OpticsLevel, ...] = ("exact", "fast")
+    levels: tuple[OpticsLevel, ...] = ("exact", "fast", "smooth")
     for level in levels:
         flat = Optics(made.calibration, level).render(np.zeros((1, ROWS, COLUMNS))).images[0]
         assert np.array_equal(flat, made.calibration.background)

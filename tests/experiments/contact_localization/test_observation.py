@@ -16,8 +16,8 @@ from harness.picture.square_pixels import made_square
 from harness.recording.observation import AROUND_IMAGES, Observation, observe_step
 from harness.recording.step_file import Step, StepRecord
 from harness.sim.optics.inverse import heights_or_refusal
+from harness.sim.optics.optics import Optics
 from harness.sim.optics.tactile_calibration import shipped_calibration
-from tests.oracles.smooth_optics import SmoothOptics
 from tests.samples.synthetic_press import BLOCK, Press, felt, stepped_block
 
 IMAGE = Channel("gel.image", "count", (120, 160, 3), "uint8", "gel")
@@ -46,7 +46,7 @@ def pressed(model: Model) -> FloatArray:
 
 @pytest.fixture(scope="module")
 def picture(model: Model, pressed: FloatArray) -> ByteArray:
-    images: ByteArray = SmoothOptics(model.calibration).render(pressed[None]).images
+    images: ByteArray = Optics(model.calibration, "smooth").render(pressed[None]).images
     return np.asarray(images[0])
 
 

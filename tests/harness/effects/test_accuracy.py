@@ -7,7 +7,7 @@ from harness.effects.accuracy import Accuracy, Knob, Level
 
 GRID = Knob("touch.grid", (30, 60, 120), "px", "number", 60)
 OPTICS = Knob(
-    "touch.optics", ("fast", "exact"), "", "method", "fast", removed={"smooth": "use touch.optics=fast"}
+    "touch.optics", ("fast", "exact"), "", "method", "fast", removed={"rough": "use touch.optics=fast"}
 )
 ZERO = Knob("rounds", (0, 1, 3), "", "number", 3)
 KNOBS = (GRID, OPTICS, ZERO)

@@ -79,7 +79,7 @@ def test_only_what_the_sensor_calls_for_is_computed(pressed_mug: dict[str, Any])
     assert more == {"touch.gel", "touch.darkening", "touch.shadow", "touch.shadow_out_of_table"} | own
 
 
-@pytest.mark.parametrize("level", ["exact", "fast"])
+@pytest.mark.parametrize("level", ["exact", "fast", "smooth"])
 @pytest.mark.parametrize("of", ["object", "gel"])
 @pytest.mark.parametrize("dome", [False, True])
 def test_no_contact_is_the_background_to_the_bit(level: str, of: Any, dome: bool) -> None:
@@ -112,13 +112,11 @@ def test_a_press_on_a_measured_dome_is_one_on_the_sensors_own() -> None:
 
 
 def test_shadows_over_a_measured_dome_fall_downhill_of_the_dome_too() -> None:
-    # Colourless: bins, at whose edge a slope may lie, play no part.
-    grey = replace(BENCH.calibration, table=np.zeros_like(BENCH.calibration.table))
-    sensor = replace(GELSIGHT_R15, casts_shadow=True)
-    grazed = replace(BENCH, sensor=sensor, calibration=grey, shadow=SHADOWS)
-    flat = press_heights(bump(1e-3), "object", grazed, SCENE)
+    grazed = replace(BENCH, sensor=replace(GELSIGHT_R15, casts_shadow=True), shadow=SHADOWS)
+    smooth = ["touch.optics=smooth"]  # which has no bins at whose edge a slope may lie
+    flat = press_heights(bump(1e-3), "object", grazed, SCENE, smooth)
     lifted = replace(grazed, rest=np.full((120, 160), 7e-3))
-    level = press_heights(bump(1e-3), "object", lifted, SCENE)
+    level = press_heights(bump(1e-3), "object", lifted, SCENE, smooth)
     assert np.abs(flat.image.astype(int) - level.image).max() <= 1
     for lean, lower in ((40e-3, slice(0, 80)), (-40e-3, slice(80, 160))):
         slope = np.repeat(np.linspace(0.0, lean, 160)[None], 120, axis=0)
@@ -195,19 +193,20 @@ def test_noise_runs_only_where_it_is_asked_for_and_is_the_seeds() -> None:
 
 
 def test_levels_are_turned_or_refused() -> None:
-    press = press_heights(bump(1e-3), "object", BENCH, SCENE, ["touch.optics=exact", "touch.gel=fast"])
-    assert press.levels == {"touch.shapes": "reference", "touch.optics": "exact", "touch.gel": "fast"}
+    press = press_heights(bump(1e-3), "object", BENCH, SCENE, ["touch.optics=smooth", "touch.gel=fast"])
+    assert press.levels == {"touch.shapes": "reference", "touch.optics": "smooth", "touch.gel": "fast"}
     for level, words in (
         ("touch.optics=exat", "did you mean 'exact'"),
         ("touch.lens=1", "no knob"),
-        ("touch.optics=smooth", "use touch.optics=fast"),
-        ("sound.radiation=bound", "leave it out"),
         ("exact", "KNOB=LEVEL"),
         ("touch.supersampling=2", "nothing that runs here goes by touch.supersampling"),
         ("sound.modes=10", "no knob"),
     ):
         with pytest.raises(WrongUse, match=words):
             press_heights(bump(1e-3), "object", BENCH, SCENE, [level])
+    table_only = replace(BENCH.calibration, smooth=np.empty((0, 3)))
+    with pytest.raises(CalibrationRefused, match="smooth"):
+        press_heights(bump(1e-3), "object", Gel(GELSIGHT_R15, table_only), SCENE, ["touch.optics=smooth"])
 
 
 def test_a_calibration_of_another_camera_is_refused() -> None:

@@ -18,8 +18,8 @@ from harness.picture.square_pixels import MADE_SQUARE, made_square
 from harness.sim.gel.gel import R15_SKIRT, deform
 from harness.sim.optics.depth_reading import DepthReading, read_press
 from harness.sim.optics.inverse import STEADY
+from harness.sim.optics.optics import Optics
 from harness.sim.optics.tactile_calibration import TactileCalibration, save_calibration, shipped_calibration
-from tests.oracles.smooth_optics import SmoothOptics
 
 NAME = "gelsight_r15_bench"
 BALL, DEPTH = 8e-3, 0.5e-3
@@ -42,7 +42,7 @@ def surface() -> FloatArray:
 
 @pytest.fixture(scope="module")
 def picture(known: TactileCalibration, surface: FloatArray) -> ByteArray:
-    return np.asarray(SmoothOptics(known).render(surface[None]).images[0])
+    return np.asarray(Optics(known, "smooth").render(surface[None]).images[0])
 
 
 @pytest.fixture(scope="module")

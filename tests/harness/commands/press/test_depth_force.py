@@ -9,20 +9,21 @@ import pytest
 
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import OutOfDomain
+from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
 from harness.cli import invoke
 from harness.effects.force_effects import read_force
+from harness.effects.touch_press import press_heights
 from harness.picture.image_file import write_png
 from harness.sim.gel.contact_force import contact_force
 from harness.sim.gel.elastic import GelElastic
-from harness.sim.gel.gel import deform
 from harness.sim.optics.depth_reading import DepthReading, read_press
 from harness.sim.optics.inverse import DRIFTING
 from harness.sim.optics.pressed_gel import Gel
 from harness.sim.optics.tactile_calibration import shipped_calibration
-from tests.oracles.smooth_optics import SmoothOptics
 from tests.samples.pressed_shapes import Pair, places
 
+SCENE = scene_from_options("builtin:mug")
 BENCH = shipped_calibration("gelsight_r15_bench")
 WORLD = Gel(GELSIGHT_R15, shipped_calibration("gelsight_r15_world"))
 """The gel that is pressed: calibrated by other presses than the one that reads."""
@@ -42,8 +43,7 @@ def _ball(radius: float, depth: float, at: Pair = (1e-3, -0.5e-3)) -> FloatArray
 
 
 def _picture(heights: FloatArray) -> ByteArray:
-    gel = deform(np.minimum(heights, THICK)[None], WORLD.calibration.header.skirt)
-    return np.asarray(SmoothOptics(WORLD.calibration).render(gel).images[0])
+    return press_heights(heights, "object", WORLD, SCENE, ["touch.optics=smooth"]).image
 
 
 def _read(heights: FloatArray) -> DepthReading:

@@ -136,7 +136,7 @@ def read_image_rgba(path: Path) -> tuple[int, ...]:
     return tuple(imread(path).shape)
 
 
-@pytest.mark.parametrize("level", ["touch.optics=exact", "touch.gel=fast"])
+@pytest.mark.parametrize("level", ["touch.optics=exact", "touch.optics=smooth", "touch.gel=fast"])
 def test_levels_are_taken_and_said(tmp_path: Path, capsys: pytest.CaptureFixture[str], level: str) -> None:
     answer = answered(capsys, tmp_path, "--height", saved(tmp_path, bump(1e-3)), "--level", level)
     name, _, value = level.partition("=")

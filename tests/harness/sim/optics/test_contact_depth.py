@@ -13,10 +13,10 @@ from harness.basics.errors import CalibrationRefused, DataRefused
 from harness.sim.gel.gel import R15_SKIRT, deform
 from harness.sim.optics.contact_depth import contact_colour, drift_of, read_depth
 from harness.sim.optics.inverse import DRIFTING, STEADY, invert
+from harness.sim.optics.optics import Optics
 from harness.sim.optics.poisson import free_heights
 from harness.sim.optics.shading import design, scaled_position
 from harness.sim.optics.tactile_calibration import TactileCalibration, shipped_calibration
-from tests.oracles.smooth_optics import SmoothOptics
 from tests.oracles.truemap import read_tmd
 from tests.samples.ball_depth import WITHIN, fit_ball, taught, usable
 
@@ -67,7 +67,7 @@ def _ball(i: float, j: float, radius: float, depth: float = 1e-3) -> FloatArray:
 def _drawn(calibration: TactileCalibration, press: FloatArray) -> tuple[ByteArray, FloatArray]:
     """A picture of a press that dims where the object touches, and the gel's surface."""
     gel = deform(press[None], R15_SKIRT)
-    image = SmoothOptics(calibration).render(gel).images.astype(np.float64)
+    image = Optics(calibration, "smooth").render(gel).images.astype(np.float64)
     touched = press > R15_SKIRT.core * press.max()
     noise = np.random.default_rng(2).normal(0.0, 1.0, image.shape)
     return _byte(image + LIGHT * touched[None, ..., None] + noise), gel

@@ -12,7 +12,6 @@ from harness.sim.optics.contact_depth import Depth, read_depth
 from harness.sim.optics.inverse_error import ColourError, height_errors
 from harness.sim.optics.optics import Optics
 from harness.sim.optics.tactile_calibration import ColourMisfit, TactileCalibration, shipped_calibration
-from tests.oracles.smooth_optics import SmoothOptics
 from tests.samples.ball_depth import sigma_without
 from tests.samples.smooth_colours import SmoothColours
 
@@ -79,7 +78,7 @@ def test_deviations_hold_a_smooth_misfit_that_the_calibration_states(
 ) -> None:
     """Tables wrong by a smooth function of the normal, another in each picture, as presses left out are."""
     balls = np.repeat(gel[:3], 2, axis=0)
-    images = _off_by(SmoothOptics(bench).render(balls).images, balls, 9.0, 0.2)
+    images = _off_by(Optics(bench, "smooth").render(balls).images, balls, 9.0, 0.2)
     plain = read_depth(images, bench)
     known = [
         replace(by, header=replace(by.header, misfit=ColourMisfit(9.0, 0.2))) for by in plain.calibrations
@@ -108,7 +107,7 @@ def _off_by(images: ByteArray, gel: FloatArray, rms: float, alike: float) -> Byt
 
 
 def test_what_the_cameras_noise_does_is_what_is_stated(bench: TactileCalibration, gel: FloatArray) -> None:
-    clean = SmoothOptics(bench).render(gel[:1]).images
+    clean = Optics(bench, "smooth").render(gel[:1]).images
     taken = np.concatenate([_noisy(clean, seed) for seed in range(16)])
     depths = read_depth(taken, bench)
     inside = depths.read.imprint.all(axis=0) & (gel[0] > 0.3e-3)

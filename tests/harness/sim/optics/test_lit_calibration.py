@@ -9,8 +9,10 @@ import pytest
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, WrongUse
+from harness.sim.gel.gel import R15_SKIRT, deform
 from harness.sim.optics.lit_calibration import LIGHT_POWERS, LitCalibration, read_calibration
 from harness.sim.optics.optics import Optics, OpticsLevel
+from harness.sim.optics.shading import KNEE, design, scaled_position
 from harness.sim.optics.tactile_calibration import (
     TactileCalibration,
     load_calibration,
@@ -18,6 +20,7 @@ from harness.sim.optics.tactile_calibration import (
     shipped_calibration,
     with_background,
 )
+from tests.oracles.light_design import light_design
 
 PITCH = 0.1245e-3
 LIGHTS = 6 * len(LIGHT_POWERS)
@@ -140,9 +143,63 @@ def test_a_file_of_one_array_is_named_for_what_it_is(tmp_path: Path) -> None:
         read_calibration(tmp_path / "absent.npz")
 
 
+def test_without_contact_there_is_no_light(lit: LitCalibration) -> None:
+    assert np.array_equal(Optics(lit, "smooth").render(np.zeros((1, 120, 160))).images[0], lit.background)
+    drawn = Optics(lit, "smooth").render(deform(np.maximum(_dent() - 0.2e-3, 0.0), R15_SKIRT)).images[0]
+    assert np.array_equal(drawn[:, 130:], lit.background[:, 130:])
+    assert not np.array_equal(drawn, lit.background)
+
+
+def test_no_light_draws_as_the_smooth_model_to_the_bit(bench: TactileCalibration) -> None:
+    dark = _lit(bench, np.zeros((LIGHTS, 3)))
+    drawn, known = (Optics(which, "smooth").render(_dent()) for which in (dark, bench))
+    assert np.array_equal(drawn.images, known.images)
+    assert np.array_equal(drawn.extrapolated, known.extrapolated)
+
+
 def test_tables_take_no_light(lit: LitCalibration, bench: TactileCalibration) -> None:
     """They hold what a contact does to the colour themselves, and published ones are drawn as published."""
     levels: tuple[OpticsLevel, ...] = ("exact", "fast")
     for level in levels:
         drawn, known = (Optics(which, level).render(_dent()).images for which in (lit, bench))
         assert np.array_equal(drawn, known)
+
+
+@pytest.mark.parametrize("height", [0.1e-3, 0.4e-3])
+def test_light_grows_with_the_indentation(bench: TactileCalibration, height: float) -> None:
+    """Over a flat gel pushed in as a whole, the constant term is all there is, and it is proportional."""
+    per_metre = np.array([-3e4, 2e4, -5e4])
+    light = np.zeros((LIGHTS, 3))
+    light[0] = per_metre
+    grey = with_background(_lit(bench, light), np.full((120, 160, 3), 128, np.uint8))
+    drawn = Optics(grey, "smooth").render(np.full((1, 120, 160), height)).images[0].astype(float)
+    assert np.abs(drawn - 128.0 - height * per_metre).max() <= 0.501
+
+
+def test_the_kernel_is_the_model_it_says(lit: LitCalibration) -> None:
+    heights = _dent()[0]
+    z = heights / PITCH
+    a, b = (np.pad(np.gradient(z)[k][1:-1, 1:-1], 1, mode="edge") for k in (0, 1))
+    normal = (np.stack([-b, -a], axis=-1) / np.sqrt(1 + a * a + b * b)[..., None]).reshape(-1, 2)
+    assert np.hypot(*normal.T).max() < KNEE * lit.header.slope_limit
+    y, x = (axis.ravel().astype(float) for axis in np.mgrid[:120, :160])
+    where = scaled_position(x, y, 120, 160)
+    change = design(normal, where) @ lit.slopes
+    change += heights.reshape(-1, 1) * (light_design(normal, where) @ lit.light)
+    wanted = np.clip(np.rint(lit.background + change.reshape(120, 160, 3)), 0, 255)
+    drawn = Optics(lit, "smooth").render(heights[None]).images[0]
+    assert np.abs(drawn - wanted).max() <= 1
+    assert (drawn != wanted).mean() < 1e-3  # heights are held to the optics' grid
+
+
+def test_no_direction_has_a_seam(lit: LitCalibration) -> None:
+    """A plane turned through every direction by little steps changes its colour by little steps."""
+    grey = with_background(lit, np.full((120, 160, 3), 128, np.uint8))
+    y, x = np.mgrid[-1:2, -1:2] * PITCH
+    turned, steps = Optics(grey, "smooth"), 720
+    heights = np.zeros((steps, 120, 160))
+    for k, turn in enumerate(2.0 * np.pi * np.arange(steps) / steps):
+        heights[k, 59:62, 79:82] = 0.3e-3 + 0.3 * (np.cos(turn) * x + np.sin(turn) * y)
+    seen = turned.render(heights).images[:, 60, 80].astype(int)
+    jumps = np.abs(seen - np.roll(seen, 1, axis=0)).max()
+    assert jumps <= 2 < np.ptp(seen, axis=0).min()

@@ -6,15 +6,18 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import OutOfDomain
+from harness.basics.errors import CalibrationRefused, OutOfDomain
 from harness.sim.gel.gel import R15_SKIRT, deform
 from harness.sim.optics.kernels import arctangent, change_exactly, change_fast, padded, to_pixels
 from harness.sim.optics.optics import Optics, OpticsLevel
+from harness.sim.optics.shading import KNEE, design, scaled_position, softly_limited
 from harness.sim.optics.tactile_calibration import TactileCalibration, shipped_calibration
 
-LEVELS: tuple[OpticsLevel, ...] = ("exact", "fast")
+LEVELS: tuple[OpticsLevel, ...] = ("exact", "fast", "smooth")
 
 
 @pytest.fixture(scope="module")
@@ -189,6 +192,29 @@ def test_a_step_is_drawn_as_the_steepest_slope_known_and_counted(world: TactileC
     assert np.array_equal(drawn[0].images, drawn[1].images)
 
 
+@settings(max_examples=50, deadline=None)
+@given(a=st.floats(0.0, 1.0), b=st.floats(0.0, 1.0), limit=st.floats(0.2, 1.0))
+def test_the_soft_limit_is_increasing_continuous_and_never_beyond(a: float, b: float, limit: float) -> None:
+    low, high = sorted((a, b))
+    assert softly_limited(low, limit) <= softly_limited(high, limit) <= limit
+    assert softly_limited(high, limit) - softly_limited(low, limit) <= high - low + 1e-12
+    if high <= KNEE * limit:
+        assert softly_limited(high, limit) == high
+
+
+def test_the_smooth_kernel_is_the_polynomial_it_says(world: TactileCalibration) -> None:
+    heights = _pressed(0.2e-3, 6e-3)
+    z = heights[0] / 0.1245e-3
+    a, b = (np.pad(np.gradient(z)[k][1:-1, 1:-1], 1, mode="edge") for k in (0, 1))
+    normal = np.stack([-b, -a], axis=-1) / np.sqrt(1 + a * a + b * b)[..., None]
+    assert np.hypot(*normal.reshape(-1, 2).T).max() < KNEE * world.header.slope_limit
+    y, x = np.mgrid[:120, :160].astype(float)
+    change = design(normal.reshape(-1, 2), scaled_position(x.ravel(), y.ravel(), 120, 160)) @ world.smooth
+    wanted = np.clip(np.rint(world.background + change.reshape(120, 160, 3)), 0, 255)
+    drawn = Optics(world, "smooth").render(heights).images[0]
+    assert (drawn != wanted).mean() < 1e-4  # sums in another order may round another way
+
+
 def test_the_arctangent_is_good_to_single_precision() -> None:
     t = np.linspace(0, 1, 4001, dtype=np.float32)
     assert max(abs(float(arctangent(v)) - np.arctan(float(v))) for v in t) < 2e-7
@@ -201,6 +227,8 @@ def test_what_cannot_be_drawn_is_refused(world: TactileCalibration) -> None:
     with pytest.raises(OutOfDomain, match="contact 1"):
         optics.render(np.stack([np.zeros((120, 160)), np.full((120, 160), np.nan)]))
     only_table = dataclasses.replace(world, smooth=np.empty((0, 3)))
+    with pytest.raises(CalibrationRefused, match="smooth"):
+        Optics(only_table, "smooth")
     assert Optics(only_table, "exact").render(np.zeros((1, 120, 160))).images.shape == (1, 120, 160, 3)
     with pytest.raises(OutOfDomain, match="rest"):
         Optics(world, "fast", rest=np.zeros((2, 2)))
