@@ -66,7 +66,7 @@ class Trunk(nn.Module):
         return hidden
 
 
-class Perceptron(Trunk):
+class SkipPerceptron(Trunk):
     """The published perceptron of sound and touch."""
 
     def __init__(

@@ -213,7 +213,7 @@ def _perceptrons(
     Raises:
         DataRefused: layers that do not fit together, or as many outputs as neither modes nor normaliser have.
     """
-    from harness.authoring.published.modules import Perceptron, ScaledPerceptrons, load_weights
+    from harness.authoring.published.modules import SkipPerceptron, ScaledPerceptrons, load_weights
 
     modules, outputs, count = [], int(given.shape[1]), len(shift)
     for prefix, _, _ in branches:
@@ -223,7 +223,7 @@ def _perceptrons(
                 f"{prefix}output_linear of {state.name} has {ends} outputs, where its modes and normaliser "
                 f"have {outputs}"
             )
-        modules.append(Perceptron(count * 21, width, outputs))
+        modules.append(SkipPerceptron(count * 21, width, outputs))
         load_weights(modules[-1], state, prefix)
     into.dropped |= state.unused()
     scales, offsets = (np.stack([branch[k] for branch in branches]) for k in (1, 2))

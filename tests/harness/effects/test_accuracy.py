@@ -40,7 +40,7 @@ def test_an_operator_sets_knobs_in_text() -> None:
         ("touch.grid=many", "is not a number"),
         ("touch.optics=exat", "did you mean 'exact'"),
         ("touch.grid", "KNOB=LEVEL"),
-        ("touch.optics=smooth", "use touch.optics=fast"),
+        ("touch.optics=rough", "use touch.optics=fast"),
         ("scale.yaws=12", "no knob scale.yaws any more; leave it out"),
     ],
 )
