@@ -32,7 +32,7 @@ from experiments.paper.touch import (
 from harness.authoring.audio.mlp import AudioTraining
 from harness.authoring.audio.profiles import PerceptronSpec
 from harness.authoring.perceptron import dense_layers, encode, set_rate
-from harness.authoring.published.modules import Osf, SkipPerceptron, ScaledPerceptrons, exported_graph
+from harness.authoring.published.modules import Osf, ScaledPerceptrons, SkipPerceptron, exported_graph
 from harness.authoring.touch.data import reference_maps, smooth_normals
 from harness.authoring.touch.mlp import TouchTraining, learned_from
 from harness.authoring.touch.profiles import TouchPerceptronSpec

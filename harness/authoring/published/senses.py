@@ -213,7 +213,7 @@ def _perceptrons(
     Raises:
         DataRefused: layers that do not fit together, or as many outputs as neither modes nor normaliser have.
     """
-    from harness.authoring.published.modules import SkipPerceptron, ScaledPerceptrons, load_weights
+    from harness.authoring.published.modules import ScaledPerceptrons, SkipPerceptron, load_weights
 
     modules, outputs, count = [], int(given.shape[1]), len(shift)
     for prefix, _, _ in branches:
