@@ -157,22 +157,7 @@ def tetrahedralize(
 
 
 def _filled_whole(mesh: Mesh, edge: float, envelope: float, stop: float) -> Tetrahedra:
-    from pytetwild.pytetwild import tetrahedralize as fill
-
-    fewer = _simplified(mesh, _SIMPLIFIED * envelope)
-    # fTetWild leaves a file of its own in the folder it runs in.
-    with TemporaryDirectory(prefix="touchstone-fill-") as folder, contextlib.chdir(folder):
-        nodes, cells = fill(
-            fewer.vertices.copy(),
-            fewer.faces.astype(np.int32),
-            edge_length_abs=edge,
-            simplify=False,
-            epsilon=envelope / fewer.diagonal,
-            stop_energy=stop,
-            num_threads=1,
-            vtk_ordering=True,
-        )
-    found = tetrahedra(np.asarray(nodes, dtype=np.float64), np.asarray(cells, dtype=np.int64))
+    found = tetrahedra(*_filled(mesh, edge, envelope, stop))
     wanted, got = enclosed_volume(mesh), float(found.volumes.sum())
     if not abs(got - wanted) <= _VOLUME_GATE * wanted:
         raise _Lost(
@@ -193,6 +178,25 @@ def _filled_whole(mesh: Mesh, edge: float, envelope: float, stop: float) -> Tetr
             "thicken it"
         )
     return found
+
+
+def _filled(mesh: Mesh, edge: float, envelope: float, stop: float) -> tuple[FloatArray, IntArray]:
+    from pytetwild.pytetwild import tetrahedralize as fill
+
+    fewer = _simplified(mesh, _SIMPLIFIED * envelope)
+    # fTetWild leaves a file of its own in the folder it runs in.
+    with TemporaryDirectory(prefix="touchstone-fill-") as folder, contextlib.chdir(folder):
+        nodes, cells = fill(
+            fewer.vertices.copy(),
+            fewer.faces.astype(np.int32),
+            edge_length_abs=edge,
+            simplify=False,
+            epsilon=envelope / fewer.diagonal,
+            stop_energy=stop,
+            num_threads=1,
+            vtk_ordering=True,
+        )
+    return np.asarray(nodes, dtype=np.float64), np.asarray(cells, dtype=np.int64)
 
 
 def _simplified(mesh: Mesh, tolerance: float) -> Mesh:
