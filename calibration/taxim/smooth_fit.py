@@ -55,7 +55,7 @@ class Manner:
 
 
 WITH_OFFSET = Manner(offset=True, rounds=3, place_ridge=1e-4)
-"""Of presses found without marks, a contact's offset included."""
+"""Fit for presses detected without marks; it includes an offset of each contact."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,7 @@ PROFILES = ("paper", "paper-smoke")
 
 @dataclass(frozen=True)
 class SizeAmounts:
-    """How much the networks of scale learn from, and for how long."""
+    """Training set sizes and epochs of the networks that estimate scale."""
 
     shapes: int  #: of the families, a tenth of them held out.
     samples: MappingProxyType[str, int]  #: draws of each shape, by sense.

@@ -98,7 +98,7 @@ class LiveFrames:
         self._drawing = threading.Lock()
 
     def start(self) -> Mapping[str, Any]:
-        """What a page begins with: name, and the camera and lamp that nobody chose."""
+        """Return the first state of a page: the object's name, and the default camera and lamp."""
         camera = camera_for(self._vision.surface, _START, _START)
         return {
             "object": self.name,

@@ -36,7 +36,7 @@ class VisionSizeEntry(Entry):
 
 
 class VisionShellEntry(Entry):
-    """How far behind the surface the networks were made to answer."""
+    """The depth behind the surface to which the networks were trained."""
 
     voxels_per_cell: Annotated[int, Field(ge=4, le=64, multiple_of=4)]
     """the unit of that depth, along a side of a cell."""

@@ -88,7 +88,7 @@ class CommandInterpreter:
 
     @property
     def as_text(self) -> bool:
-        """Whether samples leave as lines of decimal numbers."""
+        """True if samples are sent as lines of decimal numbers."""
         return self._set["encode"] == 1
 
     @property

@@ -99,7 +99,7 @@ class StrikeCounts:
 
 
 class StrikesOnBox:
-    """What inputs 0 and 1 of the hammer's box are at: idle, but for the record of each strike; a ``Source``.
+    """Samples of inputs 0 and 1 of the hammer's box: idle except for each strike's record; a ``Source``.
 
     A record takes longer to compute than a block lasts, so it is computed beside the box's loop, and begins
     with the next block after that. What it holds in front of the blow is the hammer's flight, which is quiet,

@@ -96,7 +96,7 @@ def plug_in_card(station: Station, folder: Path) -> tuple[SoundCard, Wire]:
 
 
 class StrikesOnCard(StrikesOnBox):
-    """What inputs 0 and 1 of the hammer's box are at, while the card plays what the microphone hears.
+    """Samples of inputs 0 and 1 of the hammer's box, while the card plays the microphone's sound.
 
     A strike begins on both at one scan of the box, ``AHEAD`` s after it was computed.
 

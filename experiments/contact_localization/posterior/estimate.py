@@ -125,7 +125,7 @@ class Estimate:
 
     @property
     def times_stated(self) -> float:
-        """How many times as large as stated the bench's errors are taken to be; 1 up to ``STRAINED``."""
+        """The factor by which the stated bench errors are enlarged; 1 up to ``STRAINED``."""
         return 1.0 if self.strain <= STRAINED else min(self.strain, MOST)
 
 

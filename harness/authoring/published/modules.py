@@ -23,7 +23,7 @@ _SKIP = 5
 """The layer of a published perceptron, from 0, that takes the encoded input again."""
 
 _POSITION_OCTAVES = 10
-"""Of the inputs of sound and touch."""
+"""Octaves of the positional encoding for the inputs of sound and touch."""
 
 _OPSET = 18
 """Operator set of 2022 that torch exports without converting."""

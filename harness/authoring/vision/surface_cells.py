@@ -16,7 +16,7 @@ _MARGIN = 1e-3
 """Of a cell, at least, between the object's box and the lattice's border."""
 
 _WIDER = 1e-6 / PER_CELL
-"""Of a cell: by which it is enlarged, so that rounding leaves out no triangle that it touches."""
+"""Enlargement of a cell, as a fraction of it, so that rounding drops no triangle that touches it."""
 
 
 def surface_cells(mesh: Mesh, cells: int = CELLS) -> VisionGrid:

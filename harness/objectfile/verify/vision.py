@@ -13,7 +13,7 @@ _VIEWS = 3
 _PIXELS = 48
 
 _OPAQUE = 0.5
-"""Of the light at a point of the surface, in the median: less of it is another object's fog."""
+"""Minimum median opacity at points of the surface; networks of another object stay below it."""
 
 
 def look_at_networks(of: ObjectFile, entry: VisionEntry) -> str:

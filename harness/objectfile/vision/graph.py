@@ -54,7 +54,7 @@ _AT_ONCE = 128
 
 @dataclass(frozen=True, eq=False)
 class Answers:
-    """What networks answer of points of a surface."""
+    """Outputs of the networks for points of a surface."""
 
     known: BoolArray
     """``(n,)`` whether a network is where the point is; what follows has no meaning where none is."""

@@ -32,13 +32,13 @@ DEEP = 1.0
 """Voxels: how far behind the surface networks learn to answer."""
 
 _BESIDE = 1e-6
-"""Of a cell: how far beside its cube rounding may put a point, as where a mesh is written in float32."""
+"""Rounding tolerance around a cell, as a fraction of it; meshes may be stored in float32."""
 
 _MOST_LOST = 0.02
-"""Of a surface's points: one that was written in float32 touches some cells that it did not touch before."""
+"""Maximum fraction of surface points without a network; float32 rounding moves some into other cells."""
 
 _OUTSIDE = 0.125
-"""Of a cell: how far a surface may leave the grid."""
+"""Maximum distance of a surface outside the grid, as a fraction of a cell."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What pictures of shipped ObjectFiles err by and cost on one thread, by the knobs of the renderer.
+"""Measure error and CPU time on one thread of shipped ObjectFiles' pictures, by the renderer's knobs.
 
 ``PYTHONPATH=. python tests/benchmarks/vision/bench_vision_shipped.py [NAME ...] [--views 8] [--size 256]``:
 views from around, each under another lamp, of objects that are built in; exact pictures have 4 x 4 rays a
@@ -27,7 +27,7 @@ WAYS = {
     "rays 2": RenderSettings(rays=2),
 }
 _EDGE = 3e-3
-"""m between vertices of the surface that shipped looks were built of."""
+"""Distance in m between vertices of the surface from which the shipped looks were built."""
 
 
 def main() -> None:
