@@ -36,8 +36,8 @@ class Knob(Generic[LevelT]):
     kind: Literal["number", "method"]  #: whether the levels are numbers or methods.
     default: LevelT  #: where nobody chooses.
     meaning: str = ""  #: what it dials, in a few words.
-    removed: Mapping[Level, str] = field(default_factory=dict, compare=False)
-    """levels that it had, each with what to do instead."""
+    removed: Mapping[Level, LevelT] = field(default_factory=dict, compare=False)
+    """levels of earlier versions, each with the level that replaces it."""
 
     def __post_init__(self) -> None:
         if not self.levels or len(set(self.levels)) != len(self.levels):
@@ -56,7 +56,7 @@ class Knob(Generic[LevelT]):
             if known == level and isinstance(known, str) == isinstance(level, str):
                 return known
         if level in self.removed:
-            raise WrongUse(f"{self.name} no longer has the level {level!r}; {self.removed[level]}")
+            raise WrongUse(f"{self.name} no longer has the level {level!r}; take {self.removed[level]}")
         hint = nearest(level, map(str, self.levels)) if isinstance(level, str) else f"it has {self._listed()}"
         raise WrongUse(f"{self.name} has no level {level!r}; {hint}")
 
@@ -138,8 +138,6 @@ class Accuracy(Mapping[str, Level]):
 def current_levels(knobs: Iterable[Knob[Level]], stored: Mapping[str, Level]) -> dict[str, Level]:
     """Translate levels that an earlier version stored: leave out retired knobs, replace removed levels.
 
-    A removed level becomes the default of its knob.
-
     Raises:
         WrongUse: a knob or a level that no version had.
     """
@@ -149,7 +147,7 @@ def current_levels(knobs: Iterable[Knob[Level]], stored: Mapping[str, Level]) ->
             if name not in by_name:
                 raise _unknown_knob(name, by_name)
             knob = by_name[name]
-            found[name] = knob.default if level in knob.removed else knob.checked(level)
+            found[name] = knob.checked(knob.removed.get(level, level))
     return found
 
 

@@ -35,7 +35,7 @@ LOOK = Knob(
     "method",
     "direct",
     "the ObjectFile's networks, one sample a ray; or rays on the mesh",
-    removed=dict.fromkeys(("one_sample", "onnx"), "take network, which is one sample a ray by the graph"),
+    removed={"one_sample": "network", "onnx": "network"},
 )
 
 

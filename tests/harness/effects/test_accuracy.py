@@ -6,9 +6,7 @@ from harness.basics.errors import WrongUse
 from harness.effects.accuracy import Accuracy, Knob, Level
 
 GRID = Knob("touch.grid", (30, 60, 120), "px", "number", 60)
-OPTICS = Knob(
-    "touch.optics", ("fast", "exact"), "", "method", "fast", removed={"rough": "use touch.optics=fast"}
-)
+OPTICS = Knob("touch.optics", ("fast", "exact"), "", "method", "fast", removed={"rough": "fast"})
 ZERO = Knob("rounds", (0, 1, 3), "", "number", 3)
 KNOBS = (GRID, OPTICS, ZERO)
 
@@ -40,7 +38,7 @@ def test_an_operator_sets_knobs_in_text() -> None:
         ("touch.grid=many", "is not a number"),
         ("touch.optics=exat", "did you mean 'exact'"),
         ("touch.grid", "KNOB=LEVEL"),
-        ("touch.optics=rough", "use touch.optics=fast"),
+        ("touch.optics=rough", "no longer has the level 'rough'; take fast"),
         ("scale.yaws=12", "no knob scale.yaws any more; leave it out"),
     ],
 )

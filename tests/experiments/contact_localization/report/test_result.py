@@ -172,6 +172,6 @@ def test_a_result_says_the_levels_it_was_found_at(tmp_path: Path) -> None:
     levels = dict(chosen(["localization.spacing=0.0015", "localization.senses=touch"]))
     (tmp_path / "result.json").write_text(json.dumps({"accuracy": levels}))
     assert levels_of_result(EXPERIMENT, tmp_path) == levels
-    retired = {"sound.radiation": "bound", "touch.optics": "smooth"}
-    (tmp_path / "result.json").write_text(json.dumps({"accuracy": levels | retired}))
-    assert levels_of_result(EXPERIMENT, tmp_path) == levels | {"touch.optics": "fast"}
+    earlier = {"sound.radiation": "bound", "camera.look": "onnx"}
+    (tmp_path / "result.json").write_text(json.dumps({"accuracy": levels | earlier}))
+    assert levels_of_result(EXPERIMENT, tmp_path) == levels | {"camera.look": "network"}
