@@ -83,7 +83,8 @@ def choose(fit: Candidate | None, smooth: Candidate | None, prior: ShapeEstimate
     if count >= MIN_CONTACTS and reason is None:
         return replace(found, deviation=_at_least(found, fit.prediction_error))
     few = {0: "the picture alone", 1: "1 contact"}.get(count, f"{count} contacts")
-    untested = f"{MIN_CONTACTS} contacts are needed to test this, and there is {few}"
+    verb = "is" if count < 2 else "are"
+    untested = f"{MIN_CONTACTS} contacts are needed to test this, and there {verb} {few}"
     return replace(
         found,
         deviation=np.hypot(found.deviation, np.where(found.known_by == TOUCHED, 0.0, ASSUMED_DEVIATION)),
