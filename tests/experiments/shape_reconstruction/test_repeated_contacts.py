@@ -69,7 +69,7 @@ def test_the_same_touch_ten_times_changes_no_answer(method: str) -> None:
 def test_repeated_contacts_do_not_test_the_family() -> None:
     """Ten presses at three places: the household shape is still an assumption, and no surer."""
     found = estimated("family-coarse", repeated(ONCE, 9))
-    assert any("there is 3 contacts" in flag for flag in found.flags) or "smooth" in found.flags[-1]
+    assert any("there are 3 contacts" in flag for flag in found.flags) or "smooth" in found.flags[-1]
     assert found.deviation[found.known_by != TOUCHED].min() >= 0.9 * min(
         ASSUMED_DEVIATION, found.deviation.max()
     )
