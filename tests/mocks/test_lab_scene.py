@@ -67,12 +67,12 @@ def test_anything_else_is_refused(
     file.write_text(json.dumps({**told(scene, station, None), **change}))
     with pytest.raises(WrongUse):
         read_lab_scene(file, DRAW)
-    with pytest.raises(WrongUse, match="cannot read"):
+    with pytest.raises(WrongUse, match=r"absent\.json"):
         read_lab_scene(tmp_path / "absent.json", DRAW)
 
 
 def test_a_file_without_its_mesh_is_refused(scene: SceneFile, station: Station) -> None:
-    with pytest.raises(WrongUse, match="needs the mesh of teapot"):
+    with pytest.raises(WrongUse, match="teapot"):
         nominal_bench(of_file(scene, Path("/x/teapot.stl")), station, None, np.eye(4), DRAW)
 
 

@@ -29,29 +29,28 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 def test_one_way_to_the_presses_and_no_more(
     done: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert "nothing given" in refused(["--ball-radius", "2mm"], capsys)
+    assert "FOLDER" in refused(["--ball-radius", "2mm"], capsys)
     both = refused([str(done.folder), "--station", "mock"], capsys)
-    assert "FOLDER and --station given" in both
+    assert "FOLDER and --station" in both
     late = refused(["--resume", str(done.folder), "--presses", "20", "--gap", "none"], capsys)
     assert "--presses, --gap" in late
-    assert "--ball-radius is missing" in refused(["--station", "mock"], capsys)
+    assert "--ball-radius" in refused(["--station", "mock"], capsys)
     assert "--depth 0 mm" not in refused(["--station", "mock", "--ball-radius", "-2mm"], capsys)
     few = ["--station", "mock", "--ball-radius", "2mm", "--presses", "3", "--run", str(tmp_path / "r")]
-    assert "at least 15" in refused(few, capsys)
+    assert "--presses 3" in refused(few, capsys)
     assert not (tmp_path / "r").exists()
 
 
 def test_a_run_keeps_its_ball_and_its_order_of_colours(
     done: Recording, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert "made with a ball of 2 mm" in refused([str(done.folder), "--ball-radius", "3mm"], capsys)
-    assert "--background and --channels" in refused([str(done.folder), "--channels", "bgr"], capsys)
+    assert "--ball-radius 3 mm" in refused([str(done.folder), "--ball-radius", "3mm"], capsys)
+    assert "--channels" in refused([str(done.folder), "--channels", "bgr"], capsys)
 
 
 def test_pictures_alone_say_that_they_cannot_tell_the_scale() -> None:
     answer = scale_answer(None, None)
     assert answer == {"scale": None, "scale_reason": NO_MOVES}
-    assert "cannot tell millimetres per pixel" in NO_MOVES
     assert "--station" in NO_MOVES
 
 
@@ -71,16 +70,16 @@ def test_every_number_of_the_answer_has_its_error(done: Recording) -> None:
     assert scale["pitch_m"] == pytest.approx(0.1245e-3, rel=0.05)
     assert np.array(scale["gel_from_pixels_m"]).shape == (2, 2)
     assert answer["scale_reason"] is None
-    assert not any("off the map" in said for said in doubts(run.scale(), run, 1.0))
+    assert not run.scale().off
 
 
 def test_it_is_told_that_pictures_were_made_square_and_when_another_aspect_was_taken(done: Recording) -> None:
     run = read_arm_run(done.folder)
     scale = run.scale()
-    assert not any("square by" in said or "--aspect" in said for said in doubts(scale, run, 1.0))
-    assert any("made square by 1.0300" in said for said in doubts(scale, run, 1.03))
+    assert not any(f"{scale.aspect.value:.4f}" in said for said in doubts(scale, run, 1.0))
+    assert any("1.0300" in said for said in doubts(scale, run, 1.03))
     far = scale.aspect.value + 2.0 * scale.aspect.within95
-    assert any("leave --aspect out" in said for said in doubts(scale, run, far))
+    assert any("--aspect" in said for said in doubts(scale, run, far))
 
 
 @pytest.mark.timeout(600)

@@ -40,7 +40,7 @@ def test_a_stated_pitch_and_a_name_of_no_file_are_used_as_they_are() -> None:
 
 
 def test_cropped_pictures_and_a_missing_file_are_refused() -> None:
-    with pytest.raises(WrongUse, match="not its whole picture"):
+    with pytest.raises(WrongUse, match=r"240 x 240.*320 x 240.*--pitch"):
         _pitch("gelsight-mini", 240, 240)
-    with pytest.raises(WrongUse, match="no sensor"):
+    with pytest.raises(WrongUse, match=r"nosuch\.toml"):
         _pitch("nosuch.toml", 240, 320)

@@ -152,20 +152,20 @@ def touched(drawn: DrawnDots, depth: float = 5.0) -> FloatArray:
 
 def test_a_touched_gel_is_refused_with_its_place() -> None:
     drawn = DrawnDots()
-    with pytest.raises(CalibrationRefused, match=r"the gel is touched there"):
+    with pytest.raises(CalibrationRefused, match=r"179\D+87\b"):
         markers_at_rest([drawn.picture(touched(drawn))], Printed())
 
 
 def test_pictures_between_which_the_sensor_moved_are_refused() -> None:
     drawn = DrawnDots()
     pictures = [drawn.picture(), replace(drawn, middle=(161.3, 118.8)).picture()]
-    with pytest.raises(CalibrationRefused, match="wander by"):
+    with pytest.raises(CalibrationRefused, match=r"0\.50 px.*0\.25"):
         markers_at_rest(pictures, Printed())
 
 
 def test_an_unmarked_gel_is_refused() -> None:
     plain = np.round(gel() + np.random.default_rng(0).normal(0.0, 2.0, gel().shape)).astype(np.uint8)
-    with pytest.raises(CalibrationRefused, match="this gel has none"):
+    with pytest.raises(CalibrationRefused, match=r"1 %.*15 %"):
         find_dots(plain)
 
 
@@ -176,24 +176,24 @@ def test_dots_strewn_about_are_refused() -> None:
         one = draw.uniform((15.0, 15.0), (COLUMNS - 15.0, ROWS - 15.0))
         if all(np.hypot(*(one - other)) > 16.0 for other in places):
             places.append(one)
-    with pytest.raises(CalibrationRefused, match=r"all directions|on one grid"):
+    with pytest.raises(CalibrationRefused, match=r"0\.11 .*0\.6 "):
         lay_lattice(find_dots(DrawnDots().picture(np.array(places))).places)
 
 
 def test_too_few_dots_too_small_dots_and_other_sizes_are_refused() -> None:
     few = DrawnDots(wide=3, high=3)
-    with pytest.raises(CalibrationRefused, match="at least 12"):
+    with pytest.raises(CalibrationRefused, match=r"\b9 .*\b12 "):
         lay_lattice(find_dots(few.picture()).places)
     line = DrawnDots(wide=10, high=2)
-    with pytest.raises(CalibrationRefused, match=r"rows and columns"):
+    with pytest.raises(CalibrationRefused, match=r"0\.50 .*0\.6 "):
         lay_lattice(find_dots(line.picture()).places)
     small = DrawnDots(radius=1.4, blur=0.3, spacing=10.0, wide=20, high=15, noise=0.5, ink=0.0)
-    with pytest.raises(CalibrationRefused, match=r"radius of 1\.\d px"):
+    with pytest.raises(CalibrationRefused, match=r"1\.\d px.*1\.5 px"):
         find_dots(small.picture())
     picture = DrawnDots().picture()
-    with pytest.raises(CalibrationRefused, match=r"320 x 239 and 320 x 240 pixels"):
+    with pytest.raises(CalibrationRefused, match=r"320 x 239.*320 x 240"):
         markers_at_rest([picture, picture[1:]], Printed())
-    with pytest.raises(OutOfDomain, match="no picture"):
+    with pytest.raises(OutOfDomain, match="picture"):
         markers_at_rest([], Printed())
-    with pytest.raises(OutOfDomain, match="leave one out"):
+    with pytest.raises(OutOfDomain, match=r"pitch.*spacing"):
         markers_at_rest([picture], Printed(pitch=1e-4, spacing=1e-3))

@@ -119,14 +119,14 @@ def test_a_held_out_press_has_no_part_in_its_own_score(monkeypatch: pytest.Monke
 
 def test_a_smaller_ball_than_was_pressed_is_refused() -> None:
     pictures, _ = drawn_set(24)
-    with pytest.raises(CalibrationRefused, match="ball"):
+    with pytest.raises(CalibrationRefused, match=r"8\.5 px.*7\.2 px"):
         calibrate(pictures, replace(WHO, ball_radius=0.6 * BALL * 1e-4))
 
 
 def test_a_ball_in_no_proportion_to_the_picture_is_refused() -> None:
     pictures, _ = drawn_set(16)
     for radius in (1e-4, 80e-4):
-        with pytest.raises(CalibrationRefused, match="radius of"):
+        with pytest.raises(CalibrationRefused, match=r"0\.1 mm.*5 px.*48 px"):
             calibrate(pictures, replace(WHO, ball_radius=radius))
 
 
@@ -150,9 +150,9 @@ def test_marks_are_used_only_when_asked_and_must_fit_the_ball() -> None:
     found, _, refused = mark_free._usable(plain, BALL, use_marks=False)
     assert refused == []
     assert np.abs(found.centres - centres).max() < 1.5
-    with pytest.raises(CalibrationRefused, match=r"marked circle has a radius of 13\.0 px"):
+    with pytest.raises(CalibrationRefused, match=r"20 of 20 .*0009\.png.*13\.0 px.*12\.0 px"):
         calibrate(replace(pictures, marks=too_large), WHO, use_marks=True)
-    with pytest.raises(CalibrationRefused, match="without marks"):
+    with pytest.raises(CalibrationRefused, match="--marks"):
         calibrate(pictures, WHO, use_marks=True)
 
 
@@ -161,9 +161,9 @@ def test_the_order_of_the_colours_is_held_to_a_sensor_of_the_same_make(
 ) -> None:
     made = twenty[2].calibration
     check_order(made.smooth, made)
-    with pytest.raises(CalibrationRefused, match="wrong order"):
+    with pytest.raises(CalibrationRefused, match=r"0\.13 .*1\.00 .*--channels bgr"):
         check_order(made.smooth[:, ::-1], made)
-    with pytest.raises(CalibrationRefused, match="too close to tell"):
+    with pytest.raises(CalibrationRefused, match=r"0\.06 .*0\.06 "):
         check_order(np.repeat(made.smooth.mean(axis=1, keepdims=True), 3, axis=1), made)
 
 

@@ -121,11 +121,11 @@ def _checked(pictures: Pictures) -> None:
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
-        (_exchanged, r"20 of 20 presses .* red and blue exchanged.*--channels"),
-        (_drifted, r"20 of 20 presses .* fresh background"),
-        (_overexposed, r"20 of 20 presses .* shorten the exposure"),
-        (_empty, r"20 of 20 presses .* nothing was pressed"),
-        (_a_cloth, r"20 of 20 presses .* something else was pressed"),
+        (_exchanged, r"20 of 20 .*0000\.png.*--channels"),
+        (_drifted, r"20 of 20 .*0000\.png.* 55 .* 40"),
+        (_overexposed, r"20 of 20 .*0000\.png.* 0 or 255 .*50%"),
+        (_empty, r"20 of 20 .*0000\.png.* 0\.5 .* 8 "),
+        (_a_cloth, r"20 of 20 .*0000\.png.*ball"),
     ],
 )
 def test_a_set_damaged_throughout_is_refused_as_a_whole(damage: object, says: str) -> None:
@@ -137,7 +137,7 @@ def test_a_set_damaged_throughout_is_refused_as_a_whole(damage: object, says: st
 
 def test_too_few_presses_are_refused() -> None:
     pictures, _ = drawn_set(14)
-    with pytest.raises(CalibrationRefused, match="14 presses can be used; take at least 15"):
+    with pytest.raises(CalibrationRefused, match=r"14 presses.*15"):
         _checked(pictures)
 
 
@@ -145,20 +145,20 @@ def test_presses_all_at_one_place_are_refused() -> None:
     rng = np.random.default_rng(3)
     places = np.array([60.0, 45.0]) + rng.uniform(-6.0, 6.0, (20, 2))
     images = [rounded(GEL.press((x, y), k)) for k, (x, y) in enumerate(places)]
-    with pytest.raises(CalibrationRefused, match="press all over the gel"):
+    with pytest.raises(CalibrationRefused, match=r"6%.*12%.*2\.5%.*5%"):
         _checked(press_set(images, REST))
 
 
 def test_presses_in_a_row_are_refused() -> None:
     images = [rounded(GEL.press((x, 48.0), k)) for k, x in enumerate(np.linspace(14, 113, 20))]
-    with pytest.raises(CalibrationRefused, match="spread by 0"):
+    with pytest.raises(CalibrationRefused, match=r"18%.*12%.*0\.0%.*5%"):
         _checked(press_set(images, REST))
 
 
 def test_files_of_another_size_count_among_the_refused() -> None:
     pictures, _ = drawn_set(15)
     others = tuple(Refused(f"x{k}.png", "size", "of another camera") for k in range(16))
-    with pytest.raises(CalibrationRefused, match=r"16 of 31 presses .* another camera"):
+    with pytest.raises(CalibrationRefused, match=r"16 of 31 .*x0\.png: of another camera"):
         _checked(replace(pictures, refused=others))
 
 

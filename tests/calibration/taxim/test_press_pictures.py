@@ -104,12 +104,12 @@ def test_a_picture_of_another_size_is_refused_by_name(tmp_path: Path) -> None:
 
 
 def test_folders_without_presses_and_files_that_are_no_pictures_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="no folder"):
+    with pytest.raises(WrongUse, match=r"nowhere\b.*dataPack\.npz"):
         read_pictures(tmp_path / "nowhere")
-    with pytest.raises(CalibrationRefused, match="no pictures"):
+    with pytest.raises(CalibrationRefused, match=r"\.jpeg.*dataPack\.npz"):
         read_pictures(tmp_path)
     (tmp_path / "a.png").write_bytes(b"no picture")
-    with pytest.raises(DataRefused, match=r"a\.png is no picture"):
+    with pytest.raises(DataRefused, match=r"a\.png.*10 bytes"):
         read_pictures(tmp_path)
 
 
@@ -198,7 +198,7 @@ def test_the_command_says_what_is_wrong_with_an_option(
         assert cli.invoke(["calibrate", "taxim", folder, *options, "--json"]) == 2
         assert says in json.loads(capsys.readouterr().out)["error"]
     assert cli.invoke(["calibrate", "taxim", folder, "--ball-radius", "1.2mm", "--pitch", "0.1mm"]) == 1
-    assert "2 presses can be used" in capsys.readouterr().err
+    assert "2 presses" in capsys.readouterr().err
 
 
 def test_real_presses_without_marks_are_predicted_by_others(shared_data: Path) -> None:
@@ -222,5 +222,4 @@ def test_the_marks_of_the_published_pack_are_refused_when_asked_for(
     pack = shared_data / "tactile/objectfolder_calibs/dataPack.npz"
     assert cli.invoke(["calibrate", "taxim", str(pack), "--ball-radius", "2mm", "--marks", "--json"]) == 1
     said = json.loads(capsys.readouterr().out)["error"]
-    assert "48 of 49 presses are refused" in said
-    assert "no contact is larger than the ball" in said
+    assert "48 of 49" in said

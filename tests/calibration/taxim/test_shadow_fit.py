@@ -194,7 +194,7 @@ def test_a_station_whose_light_casts_shadows_needs_a_calibration_that_has_some(t
     (tmp_path / "drawn.toml").write_text(as_drawn, encoding="utf-8")
     station = load_station(station_path("mock"))
     grazed = station.gel.model_copy(update={"casts_shadow": True})
-    with pytest.raises(WrongUse, match="showed no shadow"):
+    with pytest.raises(WrongUse, match=r"gel\.casts_shadow = true.*gelsight_r15_bench"):
         station_calibration(station.model_copy(update={"gel": grazed}))
     own = {"make": str(tmp_path / "drawn.toml"), "calibration": str(tmp_path / "shadowed.npz")}
     measured = grazed.model_copy(update=own)
@@ -205,9 +205,9 @@ def test_a_station_whose_light_casts_shadows_needs_a_calibration_that_has_some(t
 def test_tables_that_do_not_hold_together_are_refused() -> None:
     made = _made().calibration
     assert isinstance(made, ShadowedCalibration)
-    with pytest.raises(CalibrationRefused, match="samples"):
+    with pytest.raises(CalibrationRefused, match=r"\b692 .*\b691 "):
         replace(made, shadow_values=made.shadow_values[:-1])
-    with pytest.raises(CalibrationRefused, match="six finite"):
+    with pytest.raises(CalibrationRefused, match=r"shadow_rays.*\(5,\)"):
         replace(made, shadow_rays=made.shadow_rays[:-1])
-    with pytest.raises(CalibrationRefused, match="above zero"):
+    with pytest.raises(CalibrationRefused, match=r" 0 m, 1\.25 px.*0\.05 rad"):
         with_shadow(made, replace(made.shadow, depth_step=0.0), 1e-3)

@@ -71,17 +71,17 @@ def test_the_shipped_calibrations_are_what_the_fit_gives(
 
 
 def test_a_ball_smaller_than_its_contact_is_refused(pack: PressPack) -> None:
-    with pytest.raises(CalibrationRefused, match="ball"):
+    with pytest.raises(CalibrationRefused, match=r"12\.5 px.*10\.0 px"):
         fit_smooth(pack.of(chosen(49, "odd")), 10.0)
 
 
 def test_too_few_presses_and_marks_on_other_pictures_are_refused(pack: PressPack) -> None:
     options = {"sensor": "s", "serial": "n", "licence": "l", "date": "2026-01-01"}
-    with pytest.raises(CalibrationRefused, match="14 presses"):
+    with pytest.raises(CalibrationRefused, match=r"14 presses.*15"):
         fit_calibration(pack.of(np.arange(14)), pitch=0.1245e-3, ball_radius=2e-3, **options)
     half = pack.of(chosen(49, "odd"))
     turned = replace(half, centres=np.roll(half.centres, 9, axis=0))
-    with pytest.raises(CalibrationRefused, match=r"dB|steepest"):
+    with pytest.raises(CalibrationRefused, match=r"px.*16\.1 px"):
         fit_calibration(turned, pitch=0.1245e-3, ball_radius=2e-3, **options)
 
 
@@ -93,10 +93,10 @@ def test_files_that_are_no_packs_are_refused(tmp_path: Path, pack: PressPack) ->
     np.savez(
         path, f0=pack.background, imgs=pack.images, touch_center=pack.centres[:3], touch_radius=pack.radii
     )
-    with pytest.raises(CalibrationRefused, match="belong"):
+    with pytest.raises(CalibrationRefused, match=r"p\.npz.*\(49, 120, 160, 3\)"):
         read_pack(path)
     path.write_bytes(b"")
-    with pytest.raises(CalibrationRefused, match="read"):
+    with pytest.raises(CalibrationRefused, match=r"p\.npz.* \.npz"):
         read_pack(path)
 
 

@@ -148,7 +148,7 @@ def test_a_rerun_reads_the_same_to_the_bit(world: World, press: Press) -> None:
 
 
 def test_frames_that_take_longer_than_allowed_are_a_fault(bench: Bench) -> None:
-    with pytest.raises(BenchFault, match=r"3 frames take 0\.12 s"):
+    with pytest.raises(BenchFault, match=r"3 frames.*0\.12 s"):
         bench.gel.read(3, 0.1)
 
 
@@ -157,7 +157,7 @@ def test_nothing_infinite_is_obeyed(bench: Bench) -> None:
         bench.arm.move_joints(np.array([np.nan] * 6), 1.0, 1.0)
     with pytest.raises(LimitExceeded):
         bench.arm.move_line(bench.start, -1.0, 1.0)
-    with pytest.raises(BenchFault, match="no joints of the ur5e reach"):
+    with pytest.raises(BenchFault, match="ur5e"):
         bench.arm.move_line(bench.start @ translation(np.array([0.0, 0.0, 3.0])), 0.1, 0.1)
 
 

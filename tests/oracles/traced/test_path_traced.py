@@ -124,7 +124,7 @@ def test_a_broken_compiler_is_found_out_and_said(monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.usefixtures("_mitsuba")
 def test_bad_questions_are_refused() -> None:
-    with pytest.raises(WrongUse, match="no variant"):
+    with pytest.raises(WrongUse, match="abacus"):
         chosen_variant("abacus")
     traced, camera = PathTraced(plain(ball(0.05, 1), GREY)), seen_from((0.2, -0.2, 0.2))
     with pytest.raises(OutOfDomain, match="2 samples"):
@@ -146,5 +146,5 @@ def test_tinted_textures_are_named_as_not_there_yet() -> None:
 def test_without_mitsuba_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda _name: None)
     chosen_variant.cache_clear()
-    with pytest.raises(WrongUse, match="extra 'oracles'"):
+    with pytest.raises(WrongUse, match="'oracles'"):
         chosen_variant()

@@ -141,24 +141,24 @@ def test_a_press_that_slipped_is_named_and_not_used() -> None:
 
 def test_too_few_presses_are_refused() -> None:
     places = pixels(LEAST - 1)
-    with pytest.raises(CalibrationRefused, match=f"{LEAST - 1} presses.*at least {LEAST}"):
+    with pytest.raises(CalibrationRefused, match=f"{LEAST - 1} presses.* {LEAST} "):
         arm_scale([places], moved(places, matrix()))
 
 
 @pytest.mark.parametrize("direction", [(1.0, 0.0), (0.6, 0.8)])
 def test_presses_in_one_line_are_refused(direction: tuple[float, float]) -> None:
     along = np.linspace(0.0, 60.0, 20)[:, None] * np.array(direction) + 30.0
-    with pytest.raises(CalibrationRefused, match=r"line|narrowest"):
+    with pytest.raises(CalibrationRefused, match="20 presses"):
         arm_scale([along], moved(along, matrix(), NOISE))
     wavy = along + np.random.default_rng(0).normal(0.0, 0.3, along.shape)
-    with pytest.raises(CalibrationRefused, match="narrowest"):
+    with pytest.raises(CalibrationRefused, match=r"0\.0\d mm.*0\.0\d+ mm"):
         arm_scale([wavy], moved(wavy, matrix(), NOISE))
 
 
 @pytest.mark.parametrize("skew", [-0.05, 0.05])
 def test_a_picture_askew_is_refused_and_a_little_is_told(skew: float) -> None:
     places = pixels()
-    with pytest.raises(CalibrationRefused, match=r"2\.\d\d deg.*at most 2.*slips"):
+    with pytest.raises(CalibrationRefused, match=r"2\.\d\d deg.*\b2\b"):
         arm_scale([places], moved(places, matrix(skew=skew), NOISE))
     little = arm_scale([places], moved(places, matrix(skew=0.4 * skew), NOISE)).skew
     assert little.value == pytest.approx(0.4 * skew, abs=3.0 * little.sigma)
@@ -178,5 +178,5 @@ def test_an_aspect_is_taken_where_the_presses_can_tell_it_from_one() -> None:
 
 def test_a_mirrored_picture_is_refused() -> None:
     places = pixels()
-    with pytest.raises(CalibrationRefused, match="mirrored"):
+    with pytest.raises(CalibrationRefused, match=r"frames\.flange_from_gel"):
         arm_scale([places * [-1.0, 1.0]], moved(places, matrix()))

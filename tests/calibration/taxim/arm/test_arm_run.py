@@ -124,9 +124,9 @@ def test_half_a_run_is_spread_over_the_gel_already() -> None:
 @pytest.mark.parametrize(
     ("settings", "says"),
     [
-        (PressSettings(presses=14), "at least 15"),
-        (PressSettings(depth=0.0), "may be pressed by up to"),
-        (PressSettings(depth=1.9e-3), "may be pressed by up to 1.80 mm"),
+        (PressSettings(presses=14), "--presses 14.*15"),
+        (PressSettings(depth=0.0), "--depth 0 mm.* 2 mm.*1.80 mm"),
+        (PressSettings(depth=1.9e-3), "--depth 1.9 mm.*1.80 mm"),
     ],
 )
 def test_settings_that_cannot_be_are_refused_before_anything_moves(
@@ -139,7 +139,7 @@ def test_settings_that_cannot_be_are_refused_before_anything_moves(
 
 
 def test_a_ball_too_large_for_the_window_is_refused() -> None:
-    with pytest.raises(WrongUse, match="smaller ball"):
+    with pytest.raises(WrongUse, match=r"10\.6 mm.*3\.2 mm.*19\.9 x 14\.9 mm"):
         places(GELSIGHT_R15, 8e-3, PressSettings(depth=2e-3), 0)
 
 
@@ -167,12 +167,12 @@ def test_a_gel_that_never_rests_is_waited_for_then_refused(tmp_path: Path) -> No
     recording = begun(tmp_path / "run").recording
     bench = opened(recording)
     restless = Creeping(bench.gel, trembles=0.3)
-    with pytest.raises(CalibrationRefused, match=r"presses are refused, \d+ as 'unsettled'.*look to look"):
+    with pytest.raises(CalibrationRefused, match=r"\d+ as 'unsettled'"):
         perform_on(replace(bench, gel=restless), recording, Quiet())
     taken = [one for one in recording.steps() if one.step.kind == "press"]
     assert len(taken) == 8
     assert all(one.readings["press.state"].values[-1][2] >= PressSettings().still.patience for one in taken)
-    with pytest.raises(CalibrationRefused, match="came to rest"):
+    with pytest.raises(CalibrationRefused, match="press"):
         read_arm_run(recording.folder)
 
 
@@ -181,7 +181,7 @@ def test_a_light_that_fades_stops_the_run_between_two_presses_and_says_so(tmp_pa
     recording = begun(tmp_path / "run").recording
     bench = opened(recording)
     fading = Creeping(bench.gel, fades=1.0)
-    with pytest.raises(CalibrationRefused, match=r"drift: the untouched gel changed by .*at most 40"):
+    with pytest.raises(CalibrationRefused, match=r"drift.*\b40\b"):
         perform_on(replace(bench, gel=fading), recording, Quiet())
     assert 3 < recording.committed < 18
     run = read_arm_run(recording.folder)
@@ -210,14 +210,14 @@ def test_where_no_ball_stands_the_run_ends_after_three_presses(tmp_path: Path) -
     recording = begun(tmp_path / "run").recording
     bench = opened(recording)
     blind = Creeping(bench.gel, blind=True)
-    with pytest.raises(NotTouched, match="last 3 presses met nothing"):
+    with pytest.raises(NotTouched, match=r"\b3 presses"):
         perform_on(replace(bench, gel=blind), recording, Quiet())
     assert recording.committed == 4
     for record in recording.steps()[1:]:
         motion = PressMotion.from_parameters(dict(record.step.parameters))
         pose = record.readings["arm.base_from_flange"].values[-1]
         assert float((pose[:3] - motion.base_from_stand_off[:3, 3]) @ motion.axis) <= motion.lowest + 1e-6
-    with pytest.raises(CalibrationRefused, match="no ball was there"):
+    with pytest.raises(CalibrationRefused, match="ball"):
         read_arm_run(recording.folder)
 
 
@@ -297,7 +297,7 @@ def test_a_run_of_another_experiment_is_refused(tmp_path: Path, done: Recording)
 
 def test_a_run_without_a_press_yet_says_how_to_go_on(tmp_path: Path) -> None:
     recording = begun(tmp_path / "run").recording
-    with pytest.raises(CalibrationRefused, match="--resume"):
+    with pytest.raises(CalibrationRefused, match=r"0 presses.*--resume"):
         read_arm_run(recording.folder)
 
 
