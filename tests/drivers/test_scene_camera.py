@@ -87,9 +87,9 @@ def test_lamps_turn_with_the_object() -> None:
 
 def test_what_no_bench_has_is_refused() -> None:
     for ask in (scene_pinhole, scene_frame):
-        with pytest.raises(WrongUse, match=r"has no \[camera\]"):
+        with pytest.raises(WrongUse, match=r"\[camera\]"):
             ask(camera_at(None), SCENE, MESH)
     middle = apply(SCENE.base_from_object(MESH), MESH.bounds.mean(axis=0)[None])[0]
     inside = SCENE.model_copy(update={"lights": (Light.model_construct(position=tuple(middle)),)})
-    with pytest.raises(OutOfDomain, match="no direction"):
+    with pytest.raises(OutOfDomain, match="direction"):
         scene_lamps(inside, MESH)

@@ -89,12 +89,12 @@ def test_at_the_ends_of_poisson_s_ratio_its_uncertainty_is_one_sided(poisson: fl
 def test_a_depth_that_is_no_number_is_refused(bad: float) -> None:
     depth = np.zeros((1, 20, 20))
     depth[0, 10, 10] = bad
-    with pytest.raises(OutOfDomain, match="negative or not a number"):
+    with pytest.raises(OutOfDomain, match="negative"):
         contact_force(depth, PITCH, THICK, GEL)
 
 
 def test_a_press_down_to_the_plate_is_refused_and_one_just_above_is_flagged() -> None:
-    with pytest.raises(OutOfDomain, match=r"2\.51 mm deep and the gel 2\.5 mm thick"):
+    with pytest.raises(OutOfDomain, match=r"2\.51 mm.*2\.5 mm"):
         contact_force(punch(1e-3, 2.51e-3, PITCH, 40)[None], PITCH, THICK, GEL)
     found = contact_force(punch(1e-3, 2.5e-3, PITCH, 40)[None], PITCH, THICK, GEL)
     assert found.depth_share[0] == 1.0
@@ -103,7 +103,7 @@ def test_a_press_down_to_the_plate_is_refused_and_one_just_above_is_flagged() ->
 
 @pytest.mark.parametrize("shape", [(20, 20), (1, 0, 20), (1, 1, 20, 20)])
 def test_another_shape_is_refused(shape: tuple[int, ...]) -> None:
-    with pytest.raises(OutOfDomain, match=r"forces are computed of \(n, rows, columns\)"):
+    with pytest.raises(OutOfDomain, match=r"\(n, rows, columns\)"):
         contact_force(np.zeros(shape), PITCH, THICK, GEL)
 
 
@@ -141,7 +141,7 @@ def test_rough_and_tilted_faces_over_the_whole_window_settle(poisson: float, thi
 
 def test_pressures_that_do_not_settle_are_no_force(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("harness.sim.gel.contact_force._MOST_TURNS", 1)
-    with pytest.raises(OutOfDomain, match="did not settle in 1 turns"):
+    with pytest.raises(OutOfDomain, match=r"\b1 turns.*touch\.force=winkler"):
         contact_force(paraboloid(5e-3, 0.4e-3, PITCH, 64)[None], PITCH, THICK, GEL)
 
 

@@ -136,7 +136,7 @@ def test_a_repeated_contact_is_named(
 
 
 def test_no_contact_at_all_is_wrong_use(model: Model, prior: Prior) -> None:
-    with pytest.raises(WrongUse, match="at least one"):
+    with pytest.raises(WrongUse, match="contact"):
         estimate([], model, prior)
 
 
@@ -145,7 +145,7 @@ def test_a_run_that_never_touched_is_refused(
 ) -> None:
     background = run[0].calibration.background
     blank = [Observation(o.base_from_gel, np.repeat(background[None], 3, axis=0)) for o in observations]
-    with pytest.raises(FitRefused, match="no tactile image shows a contact"):
+    with pytest.raises(FitRefused, match="background"):
         estimate(blank, model, prior)
 
 

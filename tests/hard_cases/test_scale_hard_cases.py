@@ -38,14 +38,14 @@ def width(belief: Belief) -> float:
 )
 def test_the_outline_of_another_object_is_refused_with_its_misfit(known: str, shown: str) -> None:
     view = view_of(known)
-    with pytest.raises(FitRefused, match=r"px \(rms\) off"):
+    with pytest.raises(FitRefused, match=r" px.*0\.9 px"):
         by_sight(view, outline_at(view_of(shown), 1.1, yaw=0.5), nominal(view), RANGE)
 
 
 def test_an_outline_that_fits_only_far_from_what_is_stated_is_refused_with_what_that_is() -> None:
     """A wrench that stood far aside, and tilted, would have the outline of a pitcher."""
     view, shown = view_of("wrench", CameraErrors(place=0.02)), view_of("pitcher")
-    with pytest.raises(FitRefused, match=r"only if its place along x were \d+ standard deviations off"):
+    with pytest.raises(FitRefused, match=r"along x .*\d+ standard deviations"):
         by_sight(view, outline_at(shown, 0.8, 0.01, -0.01, 0.1), nominal(view), RANGE)
 
 
@@ -187,7 +187,7 @@ def test_contacts_on_one_face_hold_the_size(scale: float, seed: int) -> None:
 
 def test_a_gel_that_met_nothing_is_no_answer() -> None:
     stand, size = stand_of("mug")
-    with pytest.raises(FitRefused, match="touched nothing"):
+    with pytest.raises(FitRefused, match="gel"):
         by_touch(stand, [], size, RANGE)
 
 
@@ -203,7 +203,7 @@ def test_one_or_two_peaks_are_refused(count: int) -> None:
         levels=peaks.levels[:count],
         decays=peaks.decays[:count],
     )
-    with pytest.raises(FitRefused, match=rf"{count} peaks? .* 3 are needed"):
+    with pytest.raises(FitRefused, match=f"{count} peaks?.* 3 "):
         by_sound(few, [MaterialGuess(model(), 0.03)], NOMINAL, RANGE)
 
 

@@ -132,7 +132,7 @@ def test_an_error_is_promised_from_the_answer_s_own_radius_or_not_at_all(
     assert generous["promised_error_m"] <= 0.1
     strict = answered(done, Target(error=1e-6))
     assert not strict["kept"]
-    assert "cannot be promised" in sentences(EXPERIMENT, strict)[0]
+    assert "0.001 mm" in sentences(EXPERIMENT, strict)[0]
 
 
 def test_nothing_is_promised_from_more_contacts_than_the_run_has(done: Recording, cache: Path) -> None:
@@ -141,7 +141,7 @@ def test_nothing_is_promised_from_more_contacts_than_the_run_has(done: Recording
     save(replace(measured, points=more), curve_path(PROGRAM))
     front, target = front_of_run(done), Target(error=0.1)
     assert front.scale == 0.5
-    assert any("measured with 6 contacts" in said for said in doubts(EXPERIMENT, front, target))
+    assert any("6 contacts" in said for said in doubts(EXPERIMENT, front, target))
     found = answered(done, target)
     assert not found["kept"]
     assert found["promised_error_m"] is None
@@ -150,9 +150,9 @@ def test_nothing_is_promised_from_more_contacts_than_the_run_has(done: Recording
 def test_a_budget_that_cannot_be_kept_is_refused_before_anything_moves(done: Recording, cache: Path) -> None:
     save(curve_of(done), curve_path(PROGRAM))
     scene = RunFiles(done).scene
-    with pytest.raises(WrongUse, match="the cheapest setting may take"):
+    with pytest.raises(WrongUse, match=r"\b0\.001 s"):
         foresee(EXPERIMENT, scene, Target(seconds=1e-3))
-    assert "at most" in foresee(EXPERIMENT, scene, Target(seconds=30.0))
+    assert "30 s" in foresee(EXPERIMENT, scene, Target(seconds=30.0))
 
 
 def test_an_error_that_no_setting_promises_is_refused_before_anything_moves(
@@ -160,9 +160,9 @@ def test_an_error_that_no_setting_promises_is_refused_before_anything_moves(
 ) -> None:
     save(curve_of(done), curve_path(PROGRAM))
     scene = RunFiles(done).scene
-    with pytest.raises(WrongUse, match=r"0.001 mm cannot be promised: .* allow more"):
+    with pytest.raises(WrongUse, match=r"0\.001 mm.* mm \("):
         foresee(EXPERIMENT, scene, Target(error=1e-6))
-    assert "for an error of 100 mm" in foresee(EXPERIMENT, scene, Target(error=0.1))
+    assert "100 mm" in foresee(EXPERIMENT, scene, Target(error=0.1))
 
 
 def test_a_stale_curve_refuses_a_budget_that_a_ten_times_faster_machine_could_not_keep(
@@ -171,9 +171,9 @@ def test_a_stale_curve_refuses_a_budget_that_a_ten_times_faster_machine_could_no
     old = curve_of(done, coarse_cpu=0.2)
     save(Curve(PROGRAM, old.points, old.machine, {**old.code, "sha256": "0"}, old.made), curve_path(PROGRAM))
     scene = RunFiles(done).scene
-    with pytest.raises(WrongUse, match=r"the cheapest setting may take 0\.2. s .*code has changed"):
+    with pytest.raises(WrongUse, match=r"1e-06 s.*0\.2. s.*code"):
         foresee(EXPERIMENT, scene, Target(seconds=1e-6))
-    assert "at most" in foresee(EXPERIMENT, scene, Target(seconds=0.1))
+    assert "0.1 s" in foresee(EXPERIMENT, scene, Target(seconds=0.1))
 
 
 def test_an_error_is_refused_with_the_smallest_promise_and_where_the_run_has_too_few_contacts(
@@ -182,11 +182,11 @@ def test_an_error_is_refused_with_the_smallest_promise_and_where_the_run_has_too
     measured = curve_of(done)
     save(measured, curve_path(PROGRAM))
     scene = RunFiles(done).scene
-    with pytest.raises(WrongUse, match="the smallest error that is promised is 1 mm"):
+    with pytest.raises(WrongUse, match=r"0\.5 mm.*\b1 mm"):
         foresee(EXPERIMENT, scene, Target(error=0.5e-3))
     more = tuple(replace(point, condition={**point.condition, "contacts": 6}) for point in measured.points)
     save(replace(measured, points=more), curve_path(PROGRAM))
-    with pytest.raises(WrongUse, match="measured with 6 contacts and this run has fewer; take 6 contacts"):
+    with pytest.raises(WrongUse, match=r"100 mm.*6 contacts.*6 contacts"):
         foresee(EXPERIMENT, scene, Target(error=0.1))
 
 
@@ -252,7 +252,7 @@ def test_a_curve_of_other_code_is_used_but_not_trusted(done: Recording, cache: P
     front = front_of_run(done)
     assert not front.trusted
     assert not front.shipped
-    assert "code has changed" in staleness(EXPERIMENT, front)
+    assert "code" in staleness(EXPERIMENT, front)
 
 
 @pytest.mark.parametrize(

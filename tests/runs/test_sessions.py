@@ -96,7 +96,7 @@ def test_an_object_that_is_not_there_is_not_touched(tmp_path: Path) -> None:
 
     recording = edited(started.recording, take_away)
     bench = bench_of(recording)
-    with pytest.raises(NotTouched, match=r"^contact 1: the gel travelled .* mm and met nothing .*") as caught:
+    with pytest.raises(NotTouched, match=r"^contact 1: .* mm .* N ") as caught:
         session_of.perform_on(bench, recording, Quiet())
     assert caught.value.exit_code == 1
     assert "\n" not in str(caught.value)
@@ -135,7 +135,7 @@ def test_a_gel_that_fails_does_not_stay_pressed(tmp_path: Path) -> None:
 def test_a_folder_that_holds_a_run_is_left_as_it_is(done: Recording, tmp_path: Path) -> None:
     folder = copied(done, tmp_path / "run").folder
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    with pytest.raises(WrongUse, match="holds a run already"):
+    with pytest.raises(WrongUse, match="--resume"):
         session_of.start(touch_scene("builtin:bowl"), load_station(station_path("mock")), 1, None, folder)
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
 

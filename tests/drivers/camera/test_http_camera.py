@@ -108,7 +108,7 @@ def test_opening_and_closing_twice_does_nothing_more(bench: Bench, gel: HttpCame
     gel.read(1, 2.0)
     gel.close()
     gel.close()
-    with pytest.raises(BenchFault, match="before it was opened"):
+    with pytest.raises(BenchFault, match=r"gel .*opened"):
         gel.read(1, 1.0)
     gel.open()
     gel.read(1, 2.0)
@@ -118,7 +118,7 @@ def test_a_wrong_port_is_one_sentence_naming_the_address() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
     gel = gelsight(f"http://127.0.0.1:{port}/?action=stream", SMALL)
-    with pytest.raises(BenchFault, match=f"gel: no video stream at http://127.0.0.1:{port}/") as refused:
+    with pytest.raises(BenchFault, match=f"gel: .*http://127.0.0.1:{port}/") as refused:
         gel.open()
     assert "\n" not in str(refused.value)
     gel.close()
@@ -126,7 +126,7 @@ def test_a_wrong_port_is_one_sentence_naming_the_address() -> None:
 
 def test_pictures_of_another_size_are_refused(bench: Bench) -> None:
     gel = gelsight(bench.url, GELSIGHT_R15)
-    with pytest.raises(BenchFault, match="sends 16 x 12 pixels and the station expects 160 x 120"):
+    with pytest.raises(BenchFault, match=r"16 x 12 pixels.*160 x 120"):
         gel.open()
     assert "gel" not in [thread.name for thread in threading.enumerate()]
 
@@ -134,7 +134,7 @@ def test_pictures_of_another_size_are_refused(bench: Bench) -> None:
 def test_a_stall_is_a_fault_and_then_heals(bench: Bench, gel: HttpCamera) -> None:
     gel.read(10, 2.0)
     bench.server.fault.set(Fault("gel", "stall", 0.8))
-    with pytest.raises(BenchFault, match=r"sent [012] of 3 frames in 0.3 s; the stream at .* has stalled"):
+    with pytest.raises(BenchFault, match=r"[012] of 3 frames.*0\.3 s.*http"):
         gel.read(3, 0.3)
     assert gel.read(5, 3.0).values.shape == (5, 12, 16, 3)
     assert "opened again" in gel.health().detail
@@ -162,8 +162,8 @@ def test_a_frozen_stream_is_named_and_heals(bench: Bench, gel: HttpCamera) -> No
     assert len(set(gel.read(5, 2.0).encoded)) == 1
     assert gel.health().failure == ""
     time.sleep(3.0)
-    assert "gel is frozen" in gel.health().failure
-    with pytest.raises(BenchFault, match=r"gel is frozen: \d+ frames in [23]\.\d s are one"):
+    assert "frozen" in gel.health().failure
+    with pytest.raises(BenchFault, match=r"gel .*\d+ frames.*[23]\.\d s"):
         gel.read(1, 2.0)
     bench.server.fault.set(Fault("gel", "none"))
     time.sleep(0.2)
@@ -175,7 +175,7 @@ def test_a_frozen_stream_does_not_open(bench: Bench) -> None:
     with gelsight_open(bench):
         bench.server.fault.set(Fault("gel", "freeze"))
     camera = scene_camera(bench.url, rows=12, columns=16)
-    with pytest.raises(BenchFault, match="camera is frozen"):
+    with pytest.raises(BenchFault, match=r"camera .*\d+ frames"):
         camera.open()
 
 
@@ -194,7 +194,7 @@ def test_frames_with_other_heads_and_one_scan_are_one_picture() -> None:
     for k in range(60):
         stamp = f"{k:08d}".encode()
         camera._keep(0.05 * k, whole[:2] + b"\xff\xfe\x00\x0a" + stamp + whole[2:])
-    assert "is frozen" in camera.failure
+    assert "frozen" in camera.failure
 
 
 def test_pictures_of_a_grey_camera_are_refused_of_a_gel_and_named_of_a_scene() -> None:
@@ -205,9 +205,9 @@ def test_pictures_of_a_grey_camera_are_refused_of_a_gel_and_named_of_a_scene() -
     for jpeg in (single.tobytes(), encode(np.repeat(grey[..., None], 3, axis=2))):
         scene = stream()
         assert scene._decode(jpeg) is not None
-        assert "without colour" in scene.health().detail
+        assert "colour" in scene.health().detail
         gel = HttpCamera("gel", "http://127.0.0.1:1", scene.channel, "", colour=True)
-        with pytest.raises(BenchFault, match=r"gel: .* without colour"):
+        with pytest.raises(BenchFault, match=r"gel: .*colour"):
             gel._decode(jpeg)
         gel._decode(lit())
 
@@ -230,7 +230,7 @@ def test_a_rate_that_varies_drops_no_frames(gaps: FloatArray) -> None:
 
 def test_a_count_that_cannot_be_kept_is_a_programming_error(gel: HttpCamera) -> None:
     for count in (0, 65):
-        with pytest.raises(ValueError, match="frames asked for"):
+        with pytest.raises(ValueError, match=f"{count} frames"):
             gel.read(count, 1.0)
 
 
@@ -341,7 +341,7 @@ def test_a_head_that_states_a_vast_picture_takes_no_memory(size: int) -> None:
     at = data.index(b"\xff\xc0")
     data[at + 5 : at + 9] = struct.pack(">HH", size, size)
     tracemalloc.start()
-    with pytest.raises(BenchFault, match=f"sends {size} x {size} pixels and the station expects 160 x 120"):
+    with pytest.raises(BenchFault, match=f"{size} x {size} pixels.*160 x 120"):
         stream()._decode(bytes(data))
     assert tracemalloc.get_traced_memory()[1] < 1e6
     tracemalloc.stop()

@@ -243,7 +243,7 @@ def test_a_stated_latency_is_taken_off(library: FakePortAudio) -> None:
 def test_sound_from_before_the_opening_or_forgotten_is_refused(
     library: FakePortAudio, microphone: PortAudioMicrophone, stream: FakeStream
 ) -> None:
-    with pytest.raises(BenchFault, match=r"0\.50 s is not there any more.*30 s are kept"):
+    with pytest.raises(BenchFault, match=r"0\.50 s.*30 s"):
         microphone.between(library.time - 1.0, library.time - 0.9)
 
 
@@ -292,9 +292,9 @@ def test_a_device_that_falls_silent_is_named(
     monkeypatch: pytest.MonkeyPatch, microphone: PortAudioMicrophone, stream: FakeStream
 ) -> None:
     monkeypatch.setattr(drivers.microphone.microphone, "STALL", 0.2)
-    with pytest.raises(BenchFault, match=r"hw:2,0.*has sent nothing for 0.2 s.*check its cable"):
+    with pytest.raises(BenchFault, match=r"hw:2,0.*0\.2 s"):
         microphone.record(0.1)
-    with pytest.raises(BenchFault, match="device is gone"):
+    with pytest.raises(BenchFault, match="hw:2,0"):
         microphone.capture(lambda: None, 0.1, 0.1, 0.1)
 
 
@@ -302,7 +302,7 @@ def test_another_rate_than_asked_for_is_refused(microphone: PortAudioMicrophone,
     for _ in range(250):
         stream.deliver(elapsed=BLOCK / 44100)
     thread = deliver_soon(stream, 10)
-    with pytest.raises(BenchFault, match=r"delivers 4[0-9]{4} samples a second and 48000 were asked for"):
+    with pytest.raises(BenchFault, match=r"4[0-9]{4} .*48000"):
         microphone.record(0.05)
     thread.join()
 
@@ -317,7 +317,7 @@ def test_opening_and_closing_twice_does_nothing_more(
     microphone.close()
     assert first is not None
     assert first.closed
-    with pytest.raises(BenchFault, match="before it was opened"):
+    with pytest.raises(BenchFault, match="opened"):
         microphone.record(0.1)
 
 
@@ -344,23 +344,23 @@ def test_a_device_is_chosen_by_a_part_of_its_name_if_one_has_it(library: FakePor
 
 
 def test_a_name_that_fits_two_or_none_lists_what_there_is(library: FakePortAudio) -> None:
-    with pytest.raises(BenchFault, match=r"'Lab card' fits 2 sound inputs; .*hw:1,0.*hw:2,0"):
+    with pytest.raises(BenchFault, match=r"'Lab card'.* 2 .*hw:1,0.*hw:2,0"):
         PortAudioMicrophone("Lab card", RATE).open()
-    with pytest.raises(BenchFault, match=r"'Loud speaker' is no sound input here; .*hw:1,0.*hw:2,0"):
+    with pytest.raises(BenchFault, match=r"'Loud speaker'.*hw:1,0.*hw:2,0"):
         PortAudioMicrophone("Loud speaker", RATE).open()
     library.devices = ()
-    with pytest.raises(BenchFault, match="none at all"):
+    with pytest.raises(BenchFault, match=r"'Lab card'.*none"):
         PortAudioMicrophone("Lab card", RATE).open()
 
 
 def test_another_number_of_channels_is_refused(library: FakePortAudio) -> None:
-    with pytest.raises(BenchFault, match="has 2 input channels and the station says 1"):
+    with pytest.raises(BenchFault, match=r"2 input channels.* 1"):
         PortAudioMicrophone("Lab card: USB Audio (hw:1,0)", RATE).open()
 
 
 def test_what_the_device_does_not_do_is_one_sentence(library: FakePortAudio) -> None:
     library.refusal = "Invalid sample rate"
-    with pytest.raises(BenchFault, match="at 48000 Hz: Invalid sample rate; close other programs") as refused:
+    with pytest.raises(BenchFault, match="48000 Hz: Invalid sample rate") as refused:
         PortAudioMicrophone(MONO, RATE).open()
     assert "\n" not in str(refused.value)
 
@@ -393,8 +393,8 @@ def test_the_list_of_devices_is_made_anew_unless_a_stream_is_open(library: FakeP
 
 def test_numbers_that_cannot_be_are_a_programming_error(microphone: PortAudioMicrophone) -> None:
     for bits, channel, block, threshold in ((16, 0, 512, 1), (24, 1, 512, 1), (24, 0, 0, 1), (24, 0, 512, 0)):
-        with pytest.raises(ValueError, match="bits must be 24 or 32"):
+        with pytest.raises(ValueError, match="24 or 32"):
             PortAudioMicrophone(MONO, RATE, 1, channel, bits, block, threshold)
     for seconds in (0.0, 16.0):
-        with pytest.raises(ValueError, match="s asked for"):
+        with pytest.raises(ValueError, match=r"\b15(\.0)? s"):
             microphone.record(seconds)

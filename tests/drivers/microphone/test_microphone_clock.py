@@ -68,7 +68,7 @@ def test_a_fifth_of_a_second_cannot_invent_a_drift(drift: float, seed: int) -> N
 
 
 def test_no_block_is_no_clock() -> None:
-    with pytest.raises(ValueError, match="no block"):
+    with pytest.raises(ValueError, match="block"):
         fit_clock(np.zeros(0), np.zeros(0), RATE)
 
 
@@ -166,5 +166,5 @@ def test_only_the_newest_blocks_are_kept() -> None:
 def test_every_flag_has_words_and_no_other() -> None:
     assert len(words(63)) == 6
     assert words(0) == ()
-    with pytest.raises(DataRefused, match="the bit 64"):
+    with pytest.raises(DataRefused, match="bit 64"):
         words(65)

@@ -67,14 +67,14 @@ def test_the_dashboard_may_leave_out_the_e(board: type[Board], controller: str, 
 @pytest.mark.parametrize(("controller", "stated"), [("UR10", "ur5e"), ("UR5", "ur10e"), ("UR3", "ur5e")])
 def test_another_model_is_refused(board: type[Board], controller: str, stated: str) -> None:
     board.model = controller
-    with pytest.raises(BenchFault, match=f"the station says {stated}; .* is a {controller}"):
+    with pytest.raises(BenchFault, match=f"{stated}.*127.0.0.1.*{controller}"):
         checked_controller("127.0.0.1", stated)
     assert board.stopped == 0
 
 
 def test_local_control_is_refused(board: type[Board]) -> None:
     board.remote = False
-    with pytest.raises(BenchFault, match="is in local control"):
+    with pytest.raises(BenchFault, match="local control"):
         checked_controller("127.0.0.1", "ur5e")
     assert board.stopped == 0
 
@@ -82,7 +82,7 @@ def test_local_control_is_refused(board: type[Board]) -> None:
 @pytest.mark.parametrize("mode", ["Robotmode: POWER_OFF", "Robotmode: IDLE", "Robotmode: BOOTING"])
 def test_an_arm_without_power_is_refused(board: type[Board], mode: str) -> None:
     board.mode = mode
-    with pytest.raises(BenchFault, match="is not powered"):
+    with pytest.raises(BenchFault, match="power"):
         checked_controller("127.0.0.1", "ur5e")
     assert board.stopped == 0
 

@@ -41,7 +41,7 @@ def test_loopback_addresses_are_accepted(address: str) -> None:
     ["192.168.56.101", "10.0.0.2", "0.0.0.0", "robot.lab", "::", "", "127.0.0.1.nip.io"],  # noqa: S104
 )
 def test_every_other_address_is_refused_saying_why(address: str) -> None:
-    with pytest.raises(WrongUse, match="it will not move a real arm"):
+    with pytest.raises(WrongUse, match="real arm"):
         safety.require_loopback(address)
 
 
@@ -111,9 +111,7 @@ def test_the_tool_point_is_what_stays_in_the_box_not_the_flange() -> None:
     start_z = kinematics.forward(MODEL, READY)[2, 3]
     down = translation(np.array([0.0, 0.0, -(start_z - 0.1)]))
     safety.check_path(LIMITS, line(down, points=FLANGE), None, "line")
-    with pytest.raises(
-        LimitExceeded, match=r"tool point 1 would come to z = -0\.0\d+ m in base; the workspace is 0\.02"
-    ):
+    with pytest.raises(LimitExceeded, match=r"tool point 1 .*z = -0\.0\d+ m.* 0\.02"):
         safety.check_path(LIMITS, line(down, points=GEL), None, "line")
 
 
@@ -138,14 +136,14 @@ def test_an_arm_outside_the_box_may_come_in_but_go_no_further_out() -> None:
 
 def test_joint_range_names_the_joint() -> None:
     narrow = replace(LIMITS, joint_low=(-1.0, -2.0, -2.0, -2.0, -1.0, -1.0))
-    with pytest.raises(LimitExceeded, match=r"joint 5 at -1\.5"):
+    with pytest.raises(LimitExceeded, match=r"joint 5 .*-1\.5"):
         safety.check_path(narrow, line(np.eye(4)), None, "line")
 
 
 def test_joint_step_is_limited_even_where_all_else_would_do() -> None:
     wrist = READY + np.array([0, 0, 0, 0, 0, 3.2])
     path = paths.joint_path(MODEL, FLANGE, READY, wrist, 0.1, 2.0)
-    with pytest.raises(LimitExceeded, match=r"joint 6 would turn by 3\.2"):
+    with pytest.raises(LimitExceeded, match=r"joint 6 .*3\.2"):
         safety.check_path(LIMITS, path, None, "joint motion")
 
 
@@ -155,7 +153,7 @@ def test_speed_is_of_the_tool_point_and_the_message_says_what_would_do() -> None
     speed = 2 * LIMITS.speed / reach
     path = paths.joint_path(MODEL, FLANGE, READY, away, speed, 2.0)
     assert path.greatest_tool_speed == pytest.approx(2 * LIMITS.speed, rel=1e-3)
-    with pytest.raises(LimitExceeded, match="ask for 50 % of this speed"):
+    with pytest.raises(LimitExceeded, match="50 %"):
         safety.check_path(LIMITS, path, None, "joint motion")
 
 
@@ -165,8 +163,8 @@ def test_the_joints_and_the_tool_are_each_held_to_their_own_speed(share: float, 
     base = READY + np.array([0.5, 0, 0, 0, 0, 0])
     reach = float(np.hypot(*kinematics.forward(MODEL, READY)[:2, 3]))
     for target, speed, words in (
-        (wrist, LIMITS.joint_speed, "a joint would turn"),
-        (base, LIMITS.speed / reach, "a tool point would move"),
+        (wrist, LIMITS.joint_speed, "rad/s"),
+        (base, LIMITS.speed / reach, " m/s"),
     ):
         path = paths.joint_path(MODEL, FLANGE, READY, target, share * speed, 2.0)
         if passes:
@@ -188,13 +186,13 @@ def test_near_the_last_contact_the_slow_limit_holds_for_arriving_and_leaving() -
     up = line(translation(np.array([0.0, 0.0, 0.05])), speed=0.2)
     safety.check_path(LIMITS, up, None, "line")
     for above in (0.009, 0.055):
-        with pytest.raises(LimitExceeded, match=r"limit here is 0\.0500 m/s"):
+        with pytest.raises(LimitExceeded, match=r"0\.0500 m/s"):
             safety.check_path(LIMITS, up, here + np.array([0.0, 0.0, above]), "line")
     safety.check_path(LIMITS, up, here - np.array([0.0, 0.0, 0.02]), "line")
 
 
 def test_a_line_out_of_reach_or_through_another_branch_is_refused() -> None:
-    with pytest.raises(LimitExceeded, match="out of the ur5e's reach"):
+    with pytest.raises(LimitExceeded, match="ur5e"):
         line(translation(np.array([-0.9, 0.0, 0.0])))
     x, y = kinematics.forward(MODEL, READY)[:2, 3]
     with pytest.raises(LimitExceeded, match=r"reach|branch"):

@@ -152,11 +152,11 @@ def test_a_hung_child_is_killed_and_the_arm_stopped_through_its_dashboard(
     arm = make_arm("hang")
     arm.open()
     pid = child_pid(arm)
-    with pytest.raises(BenchFault, match="no answer within"):
+    with pytest.raises(BenchFault, match="answer"):
         move(arm)
     assert "stop" in far_end.heard
     assert not exists(pid)
-    with pytest.raises(BenchFault, match="open it again"):
+    with pytest.raises(BenchFault, match="dashboard"):
         move(arm)
 
 
@@ -174,7 +174,7 @@ def test_a_child_killed_during_a_motion_stops_the_arm(make_arm: MakeArm, far_end
     arm = make_arm("hang")
     arm.open()
     threading.Timer(0.1, os.kill, (child_pid(arm), signal.SIGKILL)).start()
-    with pytest.raises(BenchFault, match="process ended"):
+    with pytest.raises(BenchFault, match="process"):
         move(arm)
     assert far_end.heard == ["stop"]
 
@@ -206,7 +206,7 @@ def test_a_stop_ends_a_motion_from_another_thread(make_arm: MakeArm, far_end: Fa
     arm.open()
     stopper = threading.Timer(0.1, arm.stop)
     stopper.start()
-    with pytest.raises(SafetyStop, match="by request"):
+    with pytest.raises(SafetyStop, match="request"):
         move(arm)
     stopper.join()
     assert far_end.heard == []
@@ -222,7 +222,7 @@ def test_a_stop_that_is_not_acknowledged_goes_through_the_dashboard(
     arm.stop()
     assert far_end.heard == ["stop"]
     assert time.monotonic() - began < 1.0
-    with pytest.raises(BenchFault, match="through its dashboard"):
+    with pytest.raises(BenchFault, match="dashboard"):
         move(arm)
 
 
@@ -266,7 +266,7 @@ def test_one_motion_at_a_time(make_arm: MakeArm) -> None:
     first = threading.Thread(target=move_and_tell)
     first.start()
     time.sleep(0.1)
-    with pytest.raises(BenchFault, match="during a motion"):
+    with pytest.raises(BenchFault, match="motion"):
         move(arm)
     arm.stop()
     first.join()
@@ -287,9 +287,9 @@ def test_stale_state_is_a_fault(make_arm: MakeArm) -> None:
     arm.open()
     arm.state()
     time.sleep(0.9)
-    with pytest.raises(BenchFault, match="network cable"):
+    with pytest.raises(BenchFault, match="cable"):
         arm.state()
-    with pytest.raises(BenchFault, match="network cable"):
+    with pytest.raises(BenchFault, match="cable"):
         move(arm)
 
 
@@ -298,16 +298,16 @@ def test_stale_state_latches_though_it_comes_again(make_arm: MakeArm, tmp_path: 
     arm = make_arm("hiccup")
     arm.open()
     time.sleep(0.9)
-    with pytest.raises(BenchFault, match="s old"):
+    with pytest.raises(BenchFault, match=r"\d s "):
         arm.state()
     time.sleep(0.4)
     assert not arm.state().moving
-    with pytest.raises(BenchFault, match="s old"):
+    with pytest.raises(BenchFault, match=r"\d s "):
         move(arm)
     assert sent(tmp_path) == []
 
 
-@pytest.mark.parametrize(("mode", "words"), [("mute", "no answer"), ("refuse", "remote control")])
+@pytest.mark.parametrize(("mode", "words"), [("mute", "answer"), ("refuse", "remote control")])
 def test_a_child_that_does_not_open_leaves_no_process_and_no_lock(
     make_arm: MakeArm, mode: str, words: str
 ) -> None:
@@ -333,7 +333,7 @@ def test_nobody_at_the_address_names_the_cable(tmp_path: Path) -> None:
 
 
 def test_an_address_outside_this_computer_is_refused_before_anything_is_sent(tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="will not move a real arm"):
+    with pytest.raises(WrongUse, match="real arm"):
         UrArm("192.168.1.10", "ur5e", LIMITS, lock_folder=tmp_path).open()
     assert list(tmp_path.iterdir()) == []
 
@@ -341,7 +341,7 @@ def test_an_address_outside_this_computer_is_refused_before_anything_is_sent(tmp
 def test_another_model_than_the_station_says_is_noticed(make_arm: MakeArm) -> None:
     arm = make_arm("good")
     arm.model = "ur10e"
-    with pytest.raises(BenchFault, match="another model"):
+    with pytest.raises(BenchFault, match="ur10e"):
         arm.open()
 
 
@@ -418,7 +418,7 @@ def test_a_search_that_begins_in_contact_ends_there(make_arm: MakeArm, tmp_path:
     arm.open()
     assert arm.move_until_contact(DOWN, 0.01, 5.0, 0.05)
     assert sent(tmp_path) == []
-    with pytest.raises(SafetyStop, match="retreat first"):
+    with pytest.raises(SafetyStop, match=r" mm .* mm"):
         arm.zero_force()
     with pytest.raises(LimitExceeded, match=r"0\.0500 m/s"):
         arm.move_line(translation(np.array([0, 0, 0.05])) @ here(arm), 0.1, 1.0)
@@ -427,7 +427,7 @@ def test_a_search_that_begins_in_contact_ends_there(make_arm: MakeArm, tmp_path:
 def test_a_sensor_that_does_not_go_to_zero_is_a_fault(make_arm: MakeArm) -> None:
     arm = make_arm("pulled")
     arm.open()
-    with pytest.raises(BenchFault, match=r"something pulls at the tool.* reads 7\.0 N"):
+    with pytest.raises(BenchFault, match=r"7\.0 N"):
         arm.zero_force()
 
 
@@ -438,5 +438,5 @@ def test_a_busy_computer_that_sees_no_state_is_no_pull_at_the_tool(
     arm = make_arm("stale")
     arm.open()
     time.sleep(0.25)
-    with pytest.raises(BenchFault, match="too busy to see it"):
+    with pytest.raises(BenchFault, match=r"0\.1 s"):
         arm.zero_force()

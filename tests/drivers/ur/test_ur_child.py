@@ -65,7 +65,7 @@ def test_packets_keep_every_bit() -> None:
 
 
 def test_a_frame_longer_than_an_atomic_write_or_not_finite_is_refused() -> None:
-    with pytest.raises(ValueError, match="frame holds"):
+    with pytest.raises(ValueError, match=r"\d{4} bytes"):
         pipe.message_frame({"text": "x" * 5000})
     with pytest.raises(ValueError, match="JSON"):
         pipe.message_frame({"value": float("nan")})
@@ -225,7 +225,7 @@ def test_a_motion_that_ends_elsewhere_is_a_fault(monkeypatch: pytest.MonkeyPatch
     outcome = rig.look()
     assert outcome is not None
     assert isinstance(outcome.error, BenchFault)
-    assert "0.1 rad off its target" in str(outcome.error)
+    assert "0.1 rad" in str(outcome.error)
 
 
 def test_a_motion_that_never_begins_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -259,7 +259,7 @@ def test_a_dead_script_is_told_with_its_cause() -> None:
     rig.link.alive = False
     outcome = rig.look()
     assert outcome is not None
-    assert "cut short: the controller says: program stopped" in str(outcome.error)
+    assert "program stopped" in str(outcome.error)
 
 
 def test_a_motion_past_its_deadline_is_braked() -> None:
@@ -422,7 +422,7 @@ def test_an_arm_that_does_not_come_to_rest_is_stopped_through_the_dashboard(
     rig = Rig()
     rig.begin()
     rig.motion.stop(rig.link, Outcome(error=SafetyStop("asked")))
-    with pytest.raises(BenchFault, match="did not come to rest"):
+    with pytest.raises(BenchFault, match=r" s .*dashboard"):
         rig.look()
     assert rig.link.done == ["joints", "brake", "halt"]
 
@@ -463,7 +463,7 @@ def test_the_child_itself_refuses_an_address_outside_this_computer() -> None:
     ]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     assert done.returncode != 0
-    assert "will not move a real arm" in done.stderr
+    assert "real arm" in done.stderr
 
 
 def _bare() -> pipe.Message:

@@ -59,13 +59,13 @@ def noisy(picture: ByteArray, count: int, seed: int = 0) -> ByteArray:
     "pose", [np.eye(3), np.full((4, 4), np.nan), np.eye(4)[:3]], ids=["(3, 3)", "NaN", "(3, 4)"]
 )
 def test_a_pose_that_is_none_is_refused(pose: FloatArray, picture: ByteArray) -> None:
-    with pytest.raises(DataRefused, match="base_from_gel"):
+    with pytest.raises(DataRefused, match=r"base_from_gel .*\(4, 4\)"):
         Observation(pose, picture[None])
 
 
 def test_images_that_are_none_are_refused(picture: ByteArray) -> None:
     for images in (picture, picture[None][:0], picture[None, ..., :1], picture[None].astype(np.float64)):
-        with pytest.raises(DataRefused, match="images must be uint8"):
+        with pytest.raises(DataRefused, match=r"uint8 .*\(n, rows, columns, 3\)"):
             Observation(np.eye(4), images)  # type: ignore[arg-type]  # one of them is not of bytes
 
 
@@ -164,7 +164,7 @@ def test_frames_are_made_square_as_the_presses_of_the_calibration_were() -> None
 
 @pytest.mark.parametrize("without", ["gel.image", "arm.base_from_flange"])
 def test_a_step_without_a_needed_reading_is_refused_by_name(without: str) -> None:
-    with pytest.raises(RecordingDamaged, match=rf"step 4 has no '{without}'"):
+    with pytest.raises(RecordingDamaged, match=f"step 4 .*'{without}'"):
         observe_step(record(without=without), FLANGE_FROM_GEL)
 
 
@@ -177,7 +177,7 @@ def test_poses_recorded_at_other_times_than_the_images_do_not_count() -> None:
 
 def test_images_without_a_pose_in_their_time_are_refused() -> None:
     late = 0.01 - 2.0 * AROUND_IMAGES
-    with pytest.raises(RecordingDamaged, match="no pose of the arm"):
+    with pytest.raises(RecordingDamaged, match=r"step 4\b.* 0\.1 s"):
         observe_step(record((late, 0.2), (AT, AT)), FLANGE_FROM_GEL)
 
 

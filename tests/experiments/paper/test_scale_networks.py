@@ -92,7 +92,7 @@ def test_an_object_at_the_picture_s_border_is_cropped_all_the_same(place: tuple[
 
 def test_no_object_is_refused_by_name() -> None:
     picture, mask = blob(200, 250)
-    with pytest.raises(FitRefused, match="covers no pixel"):
+    with pytest.raises(FitRefused, match="pixel"):
         crop_of(picture, np.zeros_like(mask), FOCAL)
 
 
@@ -147,7 +147,7 @@ def test_lines_that_were_not_excited_are_at_the_floor() -> None:
 
 @pytest.mark.parametrize("response", [np.zeros(9600), np.zeros(10)])
 def test_silence_has_no_spectrogram(response: FloatArray) -> None:
-    with pytest.raises(FitRefused, match="nothing rings"):
+    with pytest.raises(FitRefused, match="150 to 11000 Hz"):
         spectrogram_of(response, RATE, BAND)
 
 
@@ -161,7 +161,7 @@ def test_imprints_are_in_order_and_no_more_than_there_is_room_for() -> None:
     everything, at_end = sequence_of(imprints)
     assert list(np.flatnonzero(at_end)) == [STEPS - 1]
     assert np.array_equal(everything[:4], rows[:4])
-    with pytest.raises(FitRefused, match="touched nothing"):
+    with pytest.raises(FitRefused, match="gel"):
         sequence_of([])
 
 
@@ -205,21 +205,21 @@ def test_a_network_answers_with_the_geometric_mean_of_its_views(tmp_path: Path) 
     network = paper_networks(tmp_path)["spectrogram"]
     views = [{"spectrogram": np.full((1, LINES, FRAMES), level)} for level in (-1.0, -2.0)]
     assert network.size(views) == pytest.approx(np.exp(-1.5))
-    with pytest.raises(DataRefused, match="for the logarithm of a size"):
+    with pytest.raises(DataRefused, match=r"spectrogram\.onnx.*10000.*50 "):
         network.size([{"spectrogram": np.full((1, LINES, FRAMES), 1e4)}])
 
 
 def test_a_folder_without_networks_without_cards_or_with_another_sense_s_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DataRefused, match=r"has none of picture\.onnx"):
+    with pytest.raises(DataRefused, match=r"picture\.onnx, spectrogram\.onnx, imprints\.onnx"):
         paper_networks(tmp_path)
     write_means(tmp_path, "picture")
     (tmp_path / "picture.json").unlink()
-    with pytest.raises(DataRefused, match="no card"):
+    with pytest.raises(DataRefused, match=r"/picture\.onnx .*scale --to FOLDER"):
         paper_networks(tmp_path)
     write_means(tmp_path, "spectrogram")
     (tmp_path / "spectrogram.onnx").rename(tmp_path / "picture.onnx")
     (tmp_path / "picture.json").write_text("{}")
-    with pytest.raises(DataRefused, match=r"picture\.onnx"):
+    with pytest.raises(DataRefused, match=r"picture\.onnx.*'crop'"):
         paper_networks(tmp_path)
 
 
@@ -255,7 +255,7 @@ def test_the_command_line_of_the_paper_s_profile_is_refused_in_words(
 ) -> None:
     to = ["--to", str(tmp_path / "none")]
     assert main(["scale", "--only", "sound", *to]) == 2
-    assert "it has picture, spectrogram, imprints" in capsys.readouterr().err
+    assert "picture, spectrogram, imprints" in capsys.readouterr().err
     assert own.main(["--profile", "paper", *to]) == 2
     assert "experiments.paper.train scale --to FOLDER" in capsys.readouterr().err
     monkeypatch.setattr("experiments.paper.train.find_spec", lambda _name: None)

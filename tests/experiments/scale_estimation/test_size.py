@@ -92,10 +92,10 @@ def test_an_object_made_at_the_end_of_the_range_and_a_little_off_is_in_the_inter
 def test_what_is_no_density_is_refused() -> None:
     count = len(RANGE.logs)
     for density in (np.zeros(count - 1), np.full(count, np.nan), np.full(count, -np.inf)):
-        with pytest.raises(OutOfDomain, match="density"):
+        with pytest.raises(OutOfDomain, match=r"density.* 3467 sizes"):
             Belief.of(RANGE, density)
-    with pytest.raises(OutOfDomain, match="fused"):
+    with pytest.raises(OutOfDomain):
         fused([])
     for low, high in ((0.0, 1.0), (0.2, 0.1), (0.1, np.inf)):
-        with pytest.raises(OutOfDomain, match="range"):
+        with pytest.raises(OutOfDomain, match=r"0\.0 to 1\.0 m|0\.2 to 0\.1 m|0\.1 to inf m"):
             SizeRange(low, high)

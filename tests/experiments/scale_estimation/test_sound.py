@@ -114,7 +114,7 @@ def test_a_resonance_that_is_listed_twice_says_no_more_than_once() -> None:
     np.testing.assert_array_equal(again.belief.log_density, once.belief.log_density)
     assert again.matched == once.matched
     few = replace(peaks, frequencies=peaks.frequencies[:2], levels=peaks.levels[:2], decays=peaks.decays[:2])
-    with pytest.raises(FitRefused, match="2 peaks were heard"):
+    with pytest.raises(FitRefused, match=r"2 peaks.*3 "):
         heard_size(twice(few, 1.0))
 
 
@@ -146,7 +146,7 @@ def test_beside_another_likely_size_the_interval_reaches_over_both_or_there_is_n
 
     monkeypatch.setattr(hearing, "log_likelihood", two)
     if not answered:
-        with pytest.raises(FitRefused, match="several sizes"):
+        with pytest.raises(FitRefused, match=r"14\.0 cm.*75 %.*80 %"):
             heard_size(peaks_at(1.0))
         return
     low, high = heard_size(peaks_at(1.0)).belief.interval
@@ -158,7 +158,7 @@ def test_modes_an_octave_apart_are_no_answer() -> None:
     octaves = RingingModel(400.0 * 2.0 ** np.arange(7.0), np.full(7, 0.05), MATERIALS["ceramic"])
     heard = octaves.frequencies[2:5]
     levels = octaves.levels(np.zeros(1), DECAY)[0][2:5]
-    with pytest.raises(FitRefused, match="several sizes"):
+    with pytest.raises(FitRefused, match=r"14\.0 cm.*50 %.*80 %"):
         by_sound(of(heard, levels), [MaterialGuess(octaves, 0.03)], NOMINAL, RANGE)
 
 
@@ -207,7 +207,7 @@ def test_a_size_beyond_the_range_is_named_as_such() -> None:
 
 def test_two_peaks_and_chance_are_refused() -> None:
     two = peaks_at(1.0)
-    with pytest.raises(FitRefused, match="2 peaks"):
+    with pytest.raises(FitRefused, match=r"2 peaks.*3 "):
         heard_size(of(two.frequencies[:2], two.levels[:2]))
     random = np.random.default_rng(0)
     refused = 0
@@ -278,7 +278,7 @@ def test_modes_too_dense_to_be_told_apart_are_no_answer() -> None:
         peaks = of(dense[::5], ringing.levels(np.zeros(1), DECAY)[0][::each])
         assert (modes_a_peak(peaks, ringing, 0.0) > 4.0) is refused
         if refused:
-            with pytest.raises(FitRefused, match="modes share a peak"):
+            with pytest.raises(FitRefused, match=r"5\.8 modes.*3\.2"):
                 by_sound(peaks, [MaterialGuess(ringing, 0.03)], NOMINAL, RANGE)
         else:
             assert by_sound(peaks, [MaterialGuess(ringing, 0.03)], NOMINAL, RANGE).belief.size > 0.0

@@ -99,7 +99,7 @@ def test_silence_is_finite_and_no_strike_is_no_answer() -> None:
     assert np.isfinite(extras).all()
     belief, _ = shipped("sound").belief([{"bands": bands, "extras": extras}], RANGE)
     assert np.isfinite(belief.log_density).all()
-    with pytest.raises(FitRefused, match="strike the object"):
+    with pytest.raises(FitRefused, match="strike"):
         strikes_alone([], CERAMIC, RANGE)
 
 
@@ -157,7 +157,7 @@ def test_no_more_ways_are_looked_at_than_there_is_room_for() -> None:
 
 def test_a_gel_that_met_nothing_is_no_answer() -> None:
     passed = GelWay(np.array([0.0, 0.0, 0.02]), np.array([0.0, 0.0, -1.0]), None)
-    with pytest.raises(FitRefused, match="touched nothing"):
+    with pytest.raises(FitRefused, match="gel"):
         ways_alone([passed], RANGE)
 
 

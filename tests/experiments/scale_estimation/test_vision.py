@@ -100,7 +100,7 @@ def test_a_size_beyond_the_range_is_named(scale: float) -> None:
 
 def test_another_object_is_refused() -> None:
     view, other = view_of("mug"), outline_at(view_of("wrench"), 0.8, yaw=0.7)
-    with pytest.raises(FitRefused, match=r"px \(rms\) off"):
+    with pytest.raises(FitRefused, match=r"2\.0 px.*0\.9 px"):
         by_sight(view, other, nominal(view), RANGE)
 
 
@@ -115,7 +115,7 @@ def test_without_the_camera_s_place_or_the_support_s_a_picture_says_hardly_anyth
 
 
 def test_no_object_is_no_outline() -> None:
-    with pytest.raises(DataRefused, match="covers 0 pixels"):
+    with pytest.raises(DataRefused, match=r" 0 pixels.*12 "):
         read_outline(np.zeros((ROWS, COLUMNS), bool))
 
 
@@ -128,7 +128,7 @@ def test_the_picture_s_border_hides() -> None:
 
 
 def test_a_mask_of_nearly_the_whole_picture_is_no_outline() -> None:
-    with pytest.raises(DataRefused, match="borders on most sides"):
+    with pytest.raises(DataRefused, match="border"):
         read_outline(np.ones((ROWS, COLUMNS), bool))
 
 

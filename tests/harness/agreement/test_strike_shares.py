@@ -161,5 +161,5 @@ def test_gains_of_other_strikes_are_refused() -> None:
     with pytest.raises(WrongUse, match="16 modes"):
         modes_of(gains[:, 1:])
     peak = peaks_of(np.random.default_rng(7), gains)[0]
-    with pytest.raises(WrongUse, match="a peak of 6"):
+    with pytest.raises(WrongUse, match="peak of 6"):
         gain_score(peak, modes_of(gains[1:]), NOISE)

@@ -41,5 +41,5 @@ def test_a_constant_stays_one_to_the_ends() -> None:
 
 @pytest.mark.parametrize("at", [-0.5, 99.5])
 def test_times_without_samples_are_refused(at: float) -> None:
-    with pytest.raises(ValueError, match="leave"):
+    with pytest.raises(ValueError, match="100 samples"):
         resample(np.zeros(100), 0.0, RATE, np.array([at / RATE]), RATE)

@@ -130,7 +130,7 @@ def test_a_mesh_can_be_hashed_and_a_stranger_cannot() -> None:
     same = Mesh(np.eye(3), np.array([[0, 1, 2]]))
     _ = mesh.corners  # what is cached on first use is no part of what it holds
     assert digest(mesh) == digest(same)
-    with pytest.raises(TypeError, match="cannot be hashed"):
+    with pytest.raises(TypeError, match="object"):
         digest(object())
 
 

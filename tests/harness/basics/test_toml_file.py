@@ -75,15 +75,15 @@ def test_several_mistakes_are_all_listed() -> None:
 def test_toml_that_does_not_parse_says_where(tmp_path: Path) -> None:
     path = tmp_path / "f.toml"
     path.write_text('title = "t"\n[inner\n', encoding="utf-8")
-    with pytest.raises(WrongUse, match=r"f\.toml is not TOML: .*line 2"):
+    with pytest.raises(WrongUse, match=r"f\.toml .*line 2"):
         load_toml(path, Outer)
 
 
 def test_a_file_that_is_absent_or_not_text_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="cannot be read: no such file"):
+    with pytest.raises(WrongUse, match=r"none\.toml .*no such file"):
         load_toml(tmp_path / "none.toml", Outer)
     (tmp_path / "b.toml").write_bytes(b"title = \xff")
-    with pytest.raises(WrongUse, match="not UTF-8"):
+    with pytest.raises(WrongUse, match="UTF-8"):
         load_toml(tmp_path / "b.toml", Outer)
 
 
@@ -103,12 +103,12 @@ def test_a_file_of_any_encoding_and_line_end_is_read(encoding: str, end: str, tm
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("a." * 400_000 + "a = 1", "more than 32 deep"),
-        ('"a"."' * 200_000, "more than 32 deep"),
-        ("a = " + "[" * 500_000, "more than 32 deep"),
-        ("a = 0x" + "1" * 900_000, "integer of more than 64 bits"),
+        ("a." * 400_000 + "a = 1", "32 deep"),
+        ('"a"."' * 200_000, "32 deep"),
+        ("a = " + "[" * 500_000, "32 deep"),
+        ("a = 0x" + "1" * 900_000, "64 bits"),
         ("a = " + "1" * 900_000, "4300 digits"),
-        ("[[a]]\n" * 150_000, "more than 10,000 values"),
+        ("[[a]]\n" * 150_000, "10,000 values"),
     ],
 )
 def test_a_hostile_file_is_refused_in_a_sentence_and_at_once(text: str, said: str, tmp_path: Path) -> None:

@@ -217,13 +217,13 @@ def test_two_clocks_are_brought_together() -> None:
 
 def test_swapped_channels_are_refused() -> None:
     counts = counts_of(half_sine(5000.0, ONSET), np.zeros(SCANS))[:, ::-1]
-    with pytest.raises(DataRefused, match="swapped"):
+    with pytest.raises(DataRefused, match=r"\d+ counts.*\d+, within \d+"):
         strike_from_readings(recorded(counts), CALIBRATION)
 
 
 def test_counts_of_another_converter_are_refused() -> None:
     coarse = replace(CALIBRATION, full_scale_counts=2047)
-    with pytest.raises(DataRefused, match="another box"):
+    with pytest.raises(DataRefused, match=r"counts from -?\d+ to \d+"):
         strike_from_readings(recorded(counts_of(half_sine(5000.0, ONSET), np.zeros(SCANS))), coarse)
 
 
@@ -239,7 +239,7 @@ def test_blocks_that_no_steady_clock_times_are_refused() -> None:
     readings = recorded(counts_of(half_sine(5000.0, ONSET), np.zeros(SCANS)))
     times = readings[FORCE].times + np.where(np.arange(SCANS // BLOCK) > 6, 5e-3, 0.0)
     readings[FORCE] = Reading(readings[FORCE].channel, times, readings[FORCE].values)
-    with pytest.raises(RecordingDamaged, match="steady clock"):
+    with pytest.raises(RecordingDamaged, match=r"\d us.*\d us"):
         strike_from_readings(readings, CALIBRATION)
 
 
@@ -255,8 +255,8 @@ def test_an_artefact_reads_back_and_keeps_its_hash(tmp_path: Path) -> None:
         ({"hash": "0" * 16}, "hash"),
         ({"schema": 2}, "schema"),
         ({"hammer_limit": None}, "finite"),
-        ({"hammer_limit": -1.0}, "above zero"),
-        ({"volts_per_count": 0}, "above zero"),
+        ({"hammer_limit": -1.0}, "zero"),
+        ({"volts_per_count": 0}, "zero"),
         ({"microphone_pascals_per_volt": "2"}, "finite"),
         ({"full_scale_counts": 4000}, "full_scale_counts"),
         ({"hammer_offset": float("nan")}, "finite"),

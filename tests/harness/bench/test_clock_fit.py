@@ -52,5 +52,5 @@ def test_hours_keep_only_the_newest_minutes() -> None:
 def test_a_moment_makes_no_clock() -> None:
     clock = ArrivalClock(NOMINAL)
     clock.arrived(100, 1.0)
-    with pytest.raises(ValueError, match="two moments"):
+    with pytest.raises(ValueError, match="arrivals"):
         clock.fit()

@@ -111,21 +111,21 @@ def test_a_run_keeps_a_shipped_gap_by_name_and_any_other_by_its_whole_path(
     (tmp_path / "own.toml").write_text(gap_path("none").read_text())
     monkeypatch.chdir(tmp_path)
     assert lasting_name("own.toml") == str(tmp_path / "own.toml")
-    with pytest.raises(WrongUse, match="no gap file 'other'"):
+    with pytest.raises(WrongUse, match="'other'"):
         lasting_name("other")
 
 
 def test_an_unknown_gap_names_the_shipped_ones() -> None:
-    with pytest.raises(WrongUse, match="did you mean 'default'"):
+    with pytest.raises(WrongUse, match=r"'defualt'.*'default'"):
         load_gap("defualt")
 
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"0.02 mm"', '"-0.02 mm"', "must not be negative"),
+        ('"0.02 mm"', '"-0.02 mm"', "negative"),
         ('["0 %", "0 %"]', '["3 %", "0 %"]', "upper end"),
-        ("[arm]", "[arms]", "did you mean 'arm'"),
+        ("[arm]", "[arms]", "'arms'.*'arm'"),
     ],
 )
 def test_a_gap_that_cannot_be_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:

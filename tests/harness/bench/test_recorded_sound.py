@@ -104,6 +104,6 @@ def test_wav_files_hold_the_counts(tmp_path: Path, bits: int, width: int, shift:
 def test_a_run_without_sound_has_no_wav(tmp_path: Path) -> None:
     joints = Reading(Channel("arm.joints", "rad", (6,), "float64"), np.array([1.0]), np.zeros((1, 6)))
     made = recording(tmp_path / "run", (joints,))
-    with pytest.raises(DataRefused, match=r"neither hammer\.force nor microphone\.pressure"):
+    with pytest.raises(DataRefused, match=r"hammer\.force.*microphone\.pressure"):
         export_wav(made, tmp_path / "wav")
     assert not (tmp_path / "wav").exists()

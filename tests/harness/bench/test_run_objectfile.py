@@ -60,14 +60,14 @@ def test_a_change_in_the_run_is_noticed(of: ObjectFile, tmp_path: Path) -> None:
     run = run_of(scene_of(of), tmp_path / "run")
     path = tmp_path / "run" / "objectfile" / "object.json"
     path.write_text(path.read_text().replace('"name": "mug"', '"name": "cup"'))
-    with pytest.raises(RecordingDamaged, match=r"objectfile/object\.json is missing or is not the file"):
+    with pytest.raises(RecordingDamaged, match=r"objectfile/object\.json"):
         _ = run.objectfile
 
 
 def test_nothing_is_carried_that_is_not_called_for(of: ObjectFile, tmp_path: Path) -> None:
     run = run_of(scene_of(None), tmp_path / "unnamed")
     assert not (tmp_path / "unnamed" / "objectfile").exists()
-    with pytest.raises(WrongUse, match=r"carries no ObjectFile.*sound\.shapes = elements"):
+    with pytest.raises(WrongUse, match=r"unnamed .*ObjectFile.*sound\.shapes = elements"):
         _ = run.objectfile
     touched = run_of(scene_of(of, sound=False), tmp_path / "touched")
     files = {path.name for path in touched.objectfile.folder.iterdir()}
@@ -77,6 +77,6 @@ def test_nothing_is_carried_that_is_not_called_for(of: ObjectFile, tmp_path: Pat
 
 
 def test_a_run_of_another_object_is_not_begun(of: ObjectFile, tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="is not of the scene's object: it reaches"):
+    with pytest.raises(WrongUse, match=r"x .*y .*z .* mm"):
         run_of(scene_of(of), tmp_path / "run", Mesh(1.1 * MUG.vertices, MUG.faces))
     assert not (tmp_path / "run").exists()

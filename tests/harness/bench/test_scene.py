@@ -70,13 +70,13 @@ def test_a_mesh_path_is_relative_to_the_scene_and_absolute_once_read(tmp_path: P
 def test_an_objectfile_is_found_beside_the_scene_and_must_be_one(tmp_path: Path) -> None:
     named = scene_file(tmp_path, pose='objectfile = "own/mug"')
     (tmp_path / "own" / "mug").mkdir(parents=True)
-    with pytest.raises(WrongUse, match=r"'object\.objectfile': .*own/mug is no ObjectFile"):
+    with pytest.raises(WrongUse, match=r"'object\.objectfile': .*own/mug"):
         load_scene(named)
     (tmp_path / "own" / "mug" / "object.json").write_text("{}")
     scene = load_scene(named)
     assert scene.object.objectfile == str((tmp_path / "own" / "mug").resolve())
     assert scene_from_json(json.loads(scene.model_dump_json()), "recording") == scene
-    with pytest.raises(WrongUse, match=r"unknown key 'object\.object_file'; .*did you mean 'objectfile'"):
+    with pytest.raises(WrongUse, match=r"'object\.object_file'.*'objectfile'"):
         load_scene(scene_file(tmp_path, pose='object_file = "own/mug"'))
 
 
@@ -91,13 +91,13 @@ def test_options_carry_units(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("no_such.stl", "steel"), "there is no file .*no_such.stl"),
-        (("no_such.stl",), "needs --material"),
-        (("builtin:mag",), "did you mean 'mug'"),
-        (("builtin:mug", "steal"), "did you mean 'steel'"),
+        (("no_such.stl", "steel"), "no_such.stl"),
+        (("no_such.stl",), "--material"),
+        (("builtin:mag",), "'mag'.*'mug'"),
+        (("builtin:mug", "steal"), "'steal'.*'steel'"),
         (("builtin:mug", "steel", "feet"), "'object.units' = 'feet'"),
-        (("builtin:mug", "steel", "mm", "2"), "'2' has no unit"),
-        (("builtin:mug", "steel", "mm", "2 kg"), "not a length"),
+        (("builtin:mug", "steel", "mm", "2"), "'2'"),
+        (("builtin:mug", "steel", "mm", "2 kg"), "'2 kg'"),
     ],
 )
 def test_an_option_that_cannot_be_is_refused(arguments: tuple[str, ...], said: str) -> None:

@@ -66,19 +66,19 @@ def test_a_scene_survives_a_recording(egg: ObjectFile) -> None:
 @pytest.mark.parametrize("line", ['material = "steel"', 'units = "mm"', 'wall = "2 mm"'])
 def test_what_only_a_mesh_has_is_refused_beside_it(egg: ObjectFile, tmp_path: Path, line: str) -> None:
     shutil.copytree(egg.folder, tmp_path / "egg")
-    with pytest.raises(WrongUse, match=r"ObjectFile .* says its own; leave it out"):
+    with pytest.raises(WrongUse, match=r"'object\.\w+'.*ObjectFile .*egg"):
         load_scene(written(tmp_path, f'objectfile = "egg"\n{line}'))
 
 
 def test_two_objectfiles_are_refused(egg: ObjectFile) -> None:
-    with pytest.raises(WrongUse, match="is an ObjectFile already; leave --objectfile"):
+    with pytest.raises(WrongUse, match=r"--object .*--objectfile"):
         scene_from_options(str(egg.folder), objectfile=str(egg.folder))
 
 
 def test_an_objectfile_of_another_size_than_the_scenes_is_refused(egg: ObjectFile, tmp_path: Path) -> None:
     shutil.copytree(egg.folder, tmp_path / "egg")
     scene = load_scene(written(tmp_path, 'objectfile = "egg"\nscale = 1.1'))
-    with pytest.raises(WrongUse, match="is not of the scene's object: it reaches"):
+    with pytest.raises(WrongUse, match=r"x .*y .*z .* mm"):
         known_file(scene, known_object(scene).mesh)
 
 
@@ -90,13 +90,13 @@ def test_a_material_of_other_constants_is_refused(egg: ObjectFile, tmp_path: Pat
 
     of = rewrite(tmp_path / "egg", soften)
     scene = scene_from_options(str(of.folder))
-    with pytest.raises(WrongUse, match=r"its young is 3\.6e\+10 Pa where the scene's ceramic has"):
+    with pytest.raises(WrongUse, match=r"young .*3\.6e\+10 Pa.*ceramic"):
         known_file(scene, known_object(scene).mesh)
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
-    [("{", "does not say the object's name and material"), ('{"schema": 1}', "name and material")],
+    [("{", "name and material"), ('{"schema": 1}', "name and material")],
 )
 def test_a_damaged_description_is_refused(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "object.json").write_text(text)
@@ -106,7 +106,7 @@ def test_a_damaged_description_is_refused(tmp_path: Path, text: str, said: str) 
 
 def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
     (tmp_path / "none").mkdir()
-    with pytest.raises(WrongUse, match=r"is no ObjectFile: there is no object\.json in it"):
+    with pytest.raises(WrongUse, match=r"none .*object\.json"):
         load_scene(written(tmp_path, 'objectfile = "none"'))
 
 
@@ -140,10 +140,10 @@ def test_one_in_objects_is_found_by_its_name(
     nearer = load_scene(written(elsewhere, 'objectfile = "ovum"')).object
     assert nearer.objectfile == str(elsewhere / "ovum")
     (tmp_path / "ovum").write_text("a mesh")
-    with pytest.raises(WrongUse, match="--object ovum needs --material"):
+    with pytest.raises(WrongUse, match=r"ovum.*--material"):
         scene_from_options("ovum")
 
 
 def test_a_name_that_is_none_is_answered_with_those_that_are(tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match=r"there is no ObjectFile .*mugg; did you mean 'mug'\?"):
+    with pytest.raises(WrongUse, match=r"mugg.*'mug'"):
         load_scene(written(tmp_path, 'objectfile = "mugg"'))

@@ -32,12 +32,12 @@ def test_a_vertex_is_a_place_of_the_surface() -> None:
 
 @pytest.mark.parametrize("vertex", [-1, len(MUG.vertices)])
 def test_a_vertex_that_there_is_not_is_named(vertex: int) -> None:
-    with pytest.raises(OutOfDomain, match=f"no vertex {vertex}; the mesh has {len(MUG.vertices)}"):
+    with pytest.raises(OutOfDomain, match=f"{vertex}.* {len(MUG.vertices)}"):
         pressed_place(MUG, None, vertex)
 
 
 def test_one_of_the_two_is_wanted() -> None:
-    with pytest.raises(WrongUse, match="either --contact X Y Z, or --vertex N"):
+    with pytest.raises(WrongUse, match=r"--contact X Y Z.*--vertex N"):
         pressed_place(MUG, None, None)
-    with pytest.raises(WrongUse, match="either --contact X Y Z, or --vertex N"):
+    with pytest.raises(WrongUse, match=r"--contact X Y Z.*--vertex N"):
         pressed_place(MUG, ("0", "0", "0"), 1)

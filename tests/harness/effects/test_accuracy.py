@@ -33,13 +33,13 @@ def test_an_operator_sets_knobs_in_text() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("touch.gird=60", "no knob 'touch.gird'; did you mean 'touch.grid'"),
-        ("touch.grid=61", "no level 61.0; it has 30, 60, 120 \\(px\\)"),
-        ("touch.grid=many", "is not a number"),
-        ("touch.optics=exat", "did you mean 'exact'"),
+        ("touch.gird=60", "'touch.gird'.*'touch.grid'"),
+        ("touch.grid=61", r"61.0.*30, 60, 120 \(px\)"),
+        ("touch.grid=many", "number"),
+        ("touch.optics=exat", "'exat'.*'exact'"),
         ("touch.grid", "KNOB=LEVEL"),
-        ("touch.optics=rough", "no longer has the level 'rough'; take fast"),
-        ("scale.yaws=12", "no knob scale.yaws any more; leave it out"),
+        ("touch.optics=rough", "'rough'.* fast"),
+        ("scale.yaws=12", "scale.yaws"),
     ],
 )
 def test_an_unknown_knob_or_level_is_refused_with_the_nearest(text: str, said: str) -> None:
@@ -48,7 +48,7 @@ def test_an_unknown_knob_or_level_is_refused_with_the_nearest(text: str, said: s
 
 
 def test_asking_for_a_knob_that_is_not_there_is_refused() -> None:
-    with pytest.raises(WrongUse, match="no knob"):
+    with pytest.raises(WrongUse, match=r"touch\.none"):
         Accuracy.default(KNOBS)["touch.none"]
 
 

@@ -69,11 +69,11 @@ def test_a_scene_camera_takes_its_picture_from_the_networks(tmp_path: Path) -> N
 def test_a_picture_by_networks_needs_an_objectfile_in_the_scene() -> None:
     scene = SCENE.model_copy(update={"observe": ("camera.image",)})
     accuracy = default_accuracy(EFFECTS).with_({"camera.look": "network"})
-    with pytest.raises(WrongUse, match="names no ObjectFile"):
+    with pytest.raises(WrongUse, match="ObjectFile"):
         scene_plan(scene, GELSIGHT_R15, accuracy)
 
 
 @pytest.mark.parametrize("level", ["onnx", "one_sample"])
 def test_a_level_that_was_removed_names_the_one_in_its_place(level: str) -> None:
-    with pytest.raises(WrongUse, match=rf"camera\.look no longer has the level '{level}'; take network"):
+    with pytest.raises(WrongUse, match=rf"camera\.look .*'{level}'.* network"):
         default_accuracy(EFFECTS).with_texts([f"camera.look={level}"])

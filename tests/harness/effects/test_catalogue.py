@@ -183,7 +183,7 @@ def test_markers_run_only_where_the_gel_has_them(mug: Mesh, calibration: Tactile
         assert (count["touch.marker_motion"], count["touch.markers"]) == (times, times)
         assert count == {step.effect.provides: 1 for step in made.ran}
     scene = SCENE.model_copy(update={"observe": ("touch.marker_motion",)})
-    with pytest.raises(WrongUse, match="the gel has no markers"):
+    with pytest.raises(WrongUse, match="markers"):
         scene_plan(scene, GELSIGHT_R15)
 
 
@@ -200,7 +200,7 @@ def test_untouched_dots_are_at_rest_and_pressed_ones_move(mug: Mesh, calibration
 
 
 def test_a_sensor_that_casts_shadows_needs_its_table(mug: Mesh, calibration: TactileCalibration) -> None:
-    with pytest.raises(WrongUse, match=r"sensor\.shadow_table: needed"):
+    with pytest.raises(WrongUse, match=r"sensor\.shadow_table"):
         evaluate(scene_plan(SCENE, GRAZED), sources(mug, calibration, 1e-3) | {"sensor": GRAZED})
 
 
@@ -238,7 +238,7 @@ def test_what_is_not_built_says_so_by_name() -> None:
 
 
 def test_without_touch_a_tactile_image_is_refused() -> None:
-    with pytest.raises(WrongUse, match=r"touch\.image is asked for, but sensors\.touch is false"):
+    with pytest.raises(WrongUse, match=r"touch\.image .*sensors\.touch is false"):
         scene_plan(with_sensors(touch=False), GELSIGHT_R15)
 
 

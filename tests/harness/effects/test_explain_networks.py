@@ -66,5 +66,5 @@ def test_the_command_takes_an_objectfile_as_a_scene(
 
 
 def test_a_network_of_no_objectfile_is_refused() -> None:
-    with pytest.raises(WrongUse, match="the scene names no ObjectFile"):
+    with pytest.raises(WrongUse, match="ObjectFile"):
         in_use(scene_from_options("builtin:mug"), "touch.shapes=network")

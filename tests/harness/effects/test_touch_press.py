@@ -127,13 +127,13 @@ def test_shadows_over_a_measured_dome_fall_downhill_of_the_dome_too() -> None:
 
 @pytest.mark.parametrize("of", ["object", "gel"])
 def test_heights_deeper_than_the_gel_are_refused(of: Heights) -> None:
-    with pytest.raises(OutOfDomain, match=r"pressed 4 mm deep; this gel is 2\.5 mm"):
+    with pytest.raises(OutOfDomain, match=r"4 mm.*2\.5 mm"):
         press_heights(bump(4e-3), of, BENCH, SCENE)
     press_heights(bump(GELSIGHT_R15.gel_thickness), of, BENCH, SCENE)
 
 
 def test_what_reached_deeper_than_the_gel_is_refused() -> None:
-    with pytest.raises(OutOfDomain, match="this gel is"):
+    with pytest.raises(OutOfDomain, match=r"4 mm.*2\.5 mm"):
         press_heights(bump(1e-3), "gel", BENCH, SCENE, reached=bump(4e-3))
 
 
@@ -143,7 +143,7 @@ def test_a_part_that_is_where_the_sensor_would_be_is_refused() -> None:
     # The gel is at the axis, the wall before it is behind its face.
     at = transform(inwards, np.array([0.0, 0.0, 0.05]))
     given = {"object.mesh": mug, "contact.gel_from_object": inverse(at[None])}
-    with pytest.raises(OutOfDomain, match="in the sensor's way"):
+    with pytest.raises(OutOfDomain, match=r" mm.*2\.5 mm"):
         press_mesh(given, BENCH, SCENE)
 
 
@@ -196,10 +196,10 @@ def test_levels_are_turned_or_refused() -> None:
     press = press_heights(bump(1e-3), "object", BENCH, SCENE, ["touch.optics=smooth", "touch.gel=fast"])
     assert press.levels == {"touch.shapes": "reference", "touch.optics": "smooth", "touch.gel": "fast"}
     for level, words in (
-        ("touch.optics=exat", "did you mean 'exact'"),
+        ("touch.optics=exat", "'exat'.*'exact'"),
         ("touch.lens=1", "no knob"),
         ("exact", "KNOB=LEVEL"),
-        ("touch.supersampling=2", "nothing that runs here goes by touch.supersampling"),
+        ("touch.supersampling=2", "touch.supersampling"),
         ("sound.modes=10", "no knob"),
     ):
         with pytest.raises(WrongUse, match=words):
@@ -210,7 +210,7 @@ def test_levels_are_turned_or_refused() -> None:
 
 
 def test_a_calibration_of_another_camera_is_refused() -> None:
-    with pytest.raises(DataRefused, match="120 x 160 pixels and GelSight of Taxim has 480 x 640"):
+    with pytest.raises(DataRefused, match=r"120 x 160 pixels.*480 x 640"):
         Gel(described_sensor("taxim-gelsight").sensor, BENCH.calibration)
 
 
@@ -221,14 +221,14 @@ def test_gels_are_put_together_from_what_is_said() -> None:
     fresh = np.zeros((120, 160, 3), np.uint8)
     assert not known_gel(None, None, background=fresh).calibration.background.any()
     cases: list[tuple[type[Exception], str, tuple[str | None, str | None], dict[str, Any]]] = [
-        (WrongUse, "did you mean 'gelsight-r1.5'", ("gelsight-r15", None), {}),
-        (WrongUse, "no calibration comes with", ("taxim-gelsight", None), {}),
-        (WrongUse, "contradicts", (None, None), {"pitch": 0.2e-3}),
-        (WrongUse, "needs a table of shadows", (None, None), {"shadow": True}),
-        (WrongUse, "has pixels of 0.0295 mm", ("taxim-gelsight", "gelsight_r15_world"), {}),
-        (CalibrationRefused, "there are gelsight_r15_bench", (None, "gelsight_r16"), {}),
-        (WrongUse, "there is no calibration absent.npz", (None, "absent.npz"), {}),
-        (CalibrationRefused, "not cropped", (None, None), {"background": fresh[:50]}),
+        (WrongUse, "'gelsight-r15'.*'gelsight-r1.5'", ("gelsight-r15", None), {}),
+        (WrongUse, "--calibration", ("taxim-gelsight", None), {}),
+        (WrongUse, "0.2 mm", (None, None), {"pitch": 0.2e-3}),
+        (WrongUse, "table of shadows", (None, None), {"shadow": True}),
+        (WrongUse, "0.0295 mm", ("taxim-gelsight", "gelsight_r15_world"), {}),
+        (CalibrationRefused, "'gelsight_r16'.*gelsight_r15_bench", (None, "gelsight_r16"), {}),
+        (WrongUse, "absent.npz", (None, "absent.npz"), {}),
+        (CalibrationRefused, "50 x 160", (None, None), {"background": fresh[:50]}),
     ]
     for error, words, who, more in cases:
         with pytest.raises(error, match=words):

@@ -97,53 +97,51 @@ def test_shadows_start_from_the_object_itself_at_every_level(of: ObjectFile) -> 
 
 @pytest.mark.parametrize("level", ["network", "perceptron"])
 def test_without_an_objectfile_its_levels_are_refused(level: str) -> None:
-    with pytest.raises(
-        WrongUse, match=rf"touch\.shapes = {level}: the scene names no ObjectFile .*touch\.shapes = reference"
-    ):
+    with pytest.raises(WrongUse, match=rf"touch\.shapes = {level}: .*ObjectFile .*touch\.shapes = reference"):
         evaluated(None, level)
 
 
 def test_an_objectfile_without_that_touch_is_refused(of: ObjectFile, tmp_path: Path) -> None:
     untouched = create_object(tmp_path / "peg", "peg", tb.peg(), MATERIALS["steel"], PROVENANCE)
-    with pytest.raises(DataRefused, match=r"has no touch; add it .*--only touch.*touch\.shapes = reference"):
+    with pytest.raises(DataRefused, match=r"--only touch.*touch\.shapes = reference"):
         evaluated(untouched, "network")
-    with pytest.raises(DataRefused, match="the touch of peg has no perceptron"):
+    with pytest.raises(DataRefused, match=r"peg .*perceptron"):
         evaluated(of, "perceptron")
 
 
 @pytest.mark.parametrize(
     ("mesh", "said"),
     [
-        (Mesh(tb.peg().vertices * 1e3, tb.peg().faces), r"it reaches x .* mm, the scene's object x 38000"),
-        (Mesh(tb.peg().vertices + np.array([1e-3, 0.0, 0.0]), tb.peg().faces), "it reaches x"),
+        (Mesh(tb.peg().vertices * 1e3, tb.peg().faces), "x .* mm.* x 38000"),
+        (Mesh(tb.peg().vertices + np.array([1e-3, 0.0, 0.0]), tb.peg().faces), "x .*y .*z .* mm"),
     ],
     ids=["millimetres", "moved"],
 )
 def test_another_object_is_refused_and_said(of: ObjectFile, mesh: Mesh, said: str) -> None:
-    with pytest.raises(WrongUse, match=f"is not of the scene's object: {said}.*touch.shapes = reference"):
+    with pytest.raises(WrongUse, match=f"{said}.*touch.shapes = reference"):
         evaluated(of, "network", object__mesh=mesh)
 
 
 @pytest.mark.parametrize(
     ("sensor", "skirt", "said"),
     [
-        (replace(tb.SENSOR, rows=25), tb.SKIRT, r"24 x 32 pixels and coarse 25 x 32"),
-        (replace(tb.SENSOR, pitch=0.61e-3), tb.SKIRT, r"pixels of 0\.6 mm, that of coarse of 0\.61 mm"),
-        (replace(tb.SENSOR, gel_thickness=3e-3), tb.SKIRT, r"gel of 2\.5 mm, that of coarse of 3 mm"),
-        (replace(tb.SENSOR, gel_radius=0.1), tb.SKIRT, "flat and that of coarse a dome"),
-        (tb.SENSOR, R15_SKIRT, "its skirt is .* and that of the calibration"),
+        (replace(tb.SENSOR, rows=25), tb.SKIRT, r"24 x 32 pixels.* 25 x 32"),
+        (replace(tb.SENSOR, pitch=0.61e-3), tb.SKIRT, r"0\.6 mm.* 0\.61 mm"),
+        (replace(tb.SENSOR, gel_thickness=3e-3), tb.SKIRT, r"2\.5 mm.* 3 mm"),
+        (replace(tb.SENSOR, gel_radius=0.1), tb.SKIRT, "coarse .*dome"),
+        (tb.SENSOR, R15_SKIRT, "skirt .*calibration"),
     ],
     ids=["rows", "pitch", "thickness", "dome", "skirt"],
 )
 def test_another_gel_is_refused_and_said(of: ObjectFile, sensor: Any, skirt: Any, said: str) -> None:
     calibration = replace(BENCH, header=replace(BENCH.header, skirt=skirt))
-    with pytest.raises(WrongUse, match=f"is of another gel: .*{said}.*touch.shapes = reference"):
+    with pytest.raises(WrongUse, match=f"{said}.*touch.shapes = reference"):
         evaluated(of, "network", sensor=sensor, sensor__calibration=calibration)
 
 
 def test_a_pose_that_the_codes_were_not_made_for_is_refused(of: ObjectFile) -> None:
     deep = replace(presses(), depths=np.full(6, 2.6e-3))
-    with pytest.raises(OutOfDomain, match=r"2\.6 mm deep was asked .* knows 0 to 2\.5 mm"):
+    with pytest.raises(OutOfDomain, match=r"2\.6 mm.* 0 to 2\.5 mm"):
         evaluated(of, "network", contact__gel_from_object=inverse(deep.object_from_gel))
 
 

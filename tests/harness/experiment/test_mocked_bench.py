@@ -65,6 +65,6 @@ def test_a_real_bench_has_no_gap_and_no_process_of_ours(
 ) -> None:
     real = load_station(station_path("example_bench"))
     option = "--gap" if bench is None else "--bench"
-    with pytest.raises(WrongUse, match=f"{option} is for a mocked bench"):
+    with pytest.raises(WrongUse, match=option):
         begin(EXPERIMENT, touch_scene(contacts=1), real, 3, gap, tmp_path / "run", bench)
     assert not (tmp_path / "run").exists()

@@ -79,5 +79,5 @@ def test_no_contact_has_no_place() -> None:
 def test_contacts_that_are_not_finite_points_and_axes_are_refused(
     points: FloatArray, axes: FloatArray
 ) -> None:
-    with pytest.raises(OutOfDomain, match="one finite point and one finite unit axis"):
+    with pytest.raises(OutOfDomain, match=r"shape \(.*shape \("):
         group_by_place(points, axes, TOLERANCE)

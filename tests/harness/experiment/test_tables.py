@@ -22,7 +22,7 @@ def test_a_folder_goes_on_with_the_keys_it_began_with(tmp_path: Path) -> None:
     (folder / "mug-0.json").write_text("{}")
     require_same_keys(folder, ["contacts=4", "strikes=1"])
     for other in ([], ["contacts=5", "strikes=1"]):
-        with pytest.raises(WrongUse, match="another folder with --out"):
+        with pytest.raises(WrongUse, match="--out"):
             require_same_keys(folder, other)
 
 
@@ -41,9 +41,9 @@ def test_every_scene_has_the_keys_that_are_set() -> None:
     for scene in found.values():
         stated = scene.section(section).model_dump()
         assert (stated["contacts"], stated["paper_networks"]) == (4, "some folder")
-    with pytest.raises(WrongUse, match="no setting 'contcats'"):
+    with pytest.raises(WrongUse, match="'contcats'"):
         with_assignments(scenes, section, ["contcats=4"])
-    with pytest.raises(WrongUse, match="no table in a scene"):
+    with pytest.raises(WrongUse, match="contacts=4"):
         with_assignments(scenes, None, ["contacts=4"])
 
 

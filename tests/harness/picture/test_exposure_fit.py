@@ -80,17 +80,13 @@ def test_errors_shrink_as_the_root_of_the_pixels() -> None:
     assert (less.gain_error / many.gain_error).mean() == pytest.approx(2.0, rel=0.35)
 
 
-@pytest.mark.parametrize(
-    ("radius", "said"), [(0.0, "covers 0 whole pixels"), (6.0, "are needed to fit an exposure")]
-)
+@pytest.mark.parametrize(("radius", "said"), [(0.0, " 0 whole pixels"), (6.0, r"pixels in \d+ blocks")])
 def test_an_object_too_small_is_refused(radius: float, said: str) -> None:
     with pytest.raises(DataRefused, match=said):
         fit_exposure(exposed(LIGHT, 0.0), LIGHT, disc(96, 96, radius) > 0.5)
 
 
-@pytest.mark.parametrize(
-    ("level", "said"), [(255, "9216 are saturated.*shorten"), (0, "9216 black.*lengthen")]
-)
+@pytest.mark.parametrize(("level", "said"), [(255, "9216 .*saturated"), (0, "9216 black")])
 def test_a_picture_that_is_all_white_or_black_is_refused(level: int, said: str) -> None:
     with pytest.raises(DataRefused, match=said):
         fit_exposure(np.full(LIGHT.shape, level, np.uint8), LIGHT, everywhere(LIGHT))
@@ -100,31 +96,31 @@ def test_a_picture_that_is_all_white_or_black_is_refused(level: int, said: str) 
 def test_light_that_is_not_finite_is_refused(wrong: float) -> None:
     light = LIGHT.copy()
     light[3, 4, 1] = wrong
-    with pytest.raises(DataRefused, match="1 of 27648 values of the simulated picture are not finite"):
+    with pytest.raises(DataRefused, match="1 of 27648"):
         fit_exposure(exposed(LIGHT, 0.0), light, everywhere(LIGHT))
 
 
 def test_pictures_of_two_sizes_are_refused() -> None:
-    with pytest.raises(DataRefused, match="one size in pixels"):
+    with pytest.raises(DataRefused, match=r"\(95, 96, 3\).*\(96, 96, 3\)"):
         fit_exposure(exposed(LIGHT, 0.0)[:-1], LIGHT, everywhere(LIGHT))
-    with pytest.raises(DataRefused, match="8 bits a channel"):
+    with pytest.raises(DataRefused, match="8 bits"):
         fit_exposure(LIGHT, LIGHT, everywhere(LIGHT))  # type: ignore[arg-type]
 
 
 def test_one_brightness_tells_no_offset_but_a_gain() -> None:
     flat = np.full(LIGHT.shape, 0.5)
-    with pytest.raises(DataRefused, match=r"of one brightness, 0.5 .* fit the gain alone"):
+    with pytest.raises(DataRefused, match=r"0\.5 .*spread"):
         fit_exposure(exposed(flat, 0.01), flat, everywhere(flat))
     found = fit_exposure(exposed(flat, 0.01), flat, everywhere(flat), "gain")
     np.testing.assert_allclose(found.gain, GAIN + 2.0 * OFFSET, atol=0.002)
     black = np.zeros(LIGHT.shape)
-    with pytest.raises(DataRefused, match="is black"):
+    with pytest.raises(DataRefused, match="black"):
         fit_exposure(exposed(flat, 0.01), black, everywhere(black), "gain")
 
 
 def test_pictures_of_two_things_are_refused() -> None:
     for other in (shaded(9), 1.0 - LIGHT):
-        with pytest.raises(DataRefused, match="check object, pose and light"):
+        with pytest.raises(DataRefused, match="pose"):
             fit_exposure(exposed(other, 0.01), LIGHT, everywhere(LIGHT))
 
 

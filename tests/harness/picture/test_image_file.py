@@ -25,15 +25,15 @@ def test_a_picture_reads_back_and_red_is_red(tmp_path: Path) -> None:
 
 def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.png"
-    with pytest.raises(WrongUse, match="cannot be read"):
+    with pytest.raises(WrongUse, match=r"a\.png"):
         read_image(path)
     for content in (b"", b"not a picture"):
         path.write_bytes(content)
-        with pytest.raises(DataRefused, match="is no picture"):
+        with pytest.raises(DataRefused, match=r"\d+ bytes"):
             read_image(path)
     for other in (np.zeros((4, 5), np.uint8), np.zeros((4, 5, 4), np.uint8), np.zeros((4, 5, 3), np.uint16)):
         cv2.imwrite(str(path), other)
-        with pytest.raises(DataRefused, match="8 bits a channel"):
+        with pytest.raises(DataRefused, match="8 bits"):
             read_image(path)
 
 
@@ -51,9 +51,9 @@ def test_psnr_is_of_the_pixels_that_count() -> None:
 
 def test_pictures_that_cannot_be_compared_are_refused() -> None:
     picture = np.zeros((4, 6, 3), np.uint8)
-    with pytest.raises(OutOfDomain, match="compared"):
+    with pytest.raises(OutOfDomain, match=r"\(3, 6"):
         psnr(picture, picture[:3])
-    with pytest.raises(OutOfDomain, match="compared"):
+    with pytest.raises(OutOfDomain, match=r"\(4, 6, 3\) and \(4, 6, 3\)"):
         psnr(picture, picture, np.ones((3, 6), np.bool_))
     with pytest.raises(OutOfDomain, match="no pixel"):
         psnr(picture, picture, np.zeros((4, 6), np.bool_))

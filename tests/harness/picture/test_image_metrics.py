@@ -38,7 +38,7 @@ def test_flat_pictures_differ_by_their_levels_alone() -> None:
 
 
 def test_pictures_of_two_sizes_are_refused() -> None:
-    with pytest.raises(OutOfDomain, match="cannot be compared"):
+    with pytest.raises(OutOfDomain, match=r"\(\d+, \d+.* \(\d+, \d+"):
         ssim(PICTURE, PICTURE[1:])
 
 
@@ -50,7 +50,7 @@ def test_likeness_of_a_part_is_of_that_part() -> None:
     parts = [ssim(PICTURE, other, where) for where in (left, ~left)]
     assert parts[0] < parts[1]
     assert 0.4 * parts[0] + 0.6 * parts[1] == pytest.approx(ssim(PICTURE, other))
-    with pytest.raises(OutOfDomain, match="no pixel was chosen"):
+    with pytest.raises(OutOfDomain, match="no pixel"):
         ssim(PICTURE, other, left & ~left)
-    with pytest.raises(OutOfDomain, match="cannot be compared"):
+    with pytest.raises(OutOfDomain, match=r"\(\d+, \d+.* \(\d+, \d+"):
         ssim(PICTURE, other, left[1:])

@@ -67,7 +67,7 @@ def test_pictures_of_other_shapes_are_refused() -> None:
     with pytest.raises(OutOfDomain, match="rows, columns"):
         LinearImage(np.zeros((3, 4, 3)), np.zeros((3, 5)), np.zeros((3, 5)))
     other = LinearImage(np.zeros((2, 2, 3)), np.zeros((2, 2)), np.zeros((2, 2)))
-    with pytest.raises(OutOfDomain, match="compared"):
+    with pytest.raises(OutOfDomain, match=r"\(2, 2"):
         root_mean_square(picture(1.0), other)
 
 
@@ -91,5 +91,5 @@ def test_larger_pixels_hold_the_same_light_and_the_depth_of_what_they_show() -> 
 
 @pytest.mark.parametrize("by", [0, 4, 5])
 def test_pixels_that_do_not_fit_into_larger_ones_are_refused(by: int) -> None:
-    with pytest.raises(OutOfDomain, match="no whole number"):
+    with pytest.raises(OutOfDomain, match=f"{by} x {by}"):
         binned(picture(1.0), by)

@@ -75,22 +75,22 @@ def test_masks_without_a_pixel_are_the_same() -> None:
 
 @pytest.mark.parametrize("background", [BENCH, None])
 def test_a_picture_of_another_size_is_refused(background: ByteArray | None) -> None:
-    with pytest.raises(DataRefused, match="is 95 x 96 pixels and the simulated one 96 x 96"):
+    with pytest.raises(DataRefused, match=r"95 x 96 pixels.*96 x 96"):
         compare_live(LIVE[:, 1:], IMAGE, background)
-    with pytest.raises(DataRefused, match="that of the bench 96 x 90"):
+    with pytest.raises(DataRefused, match="96 x 90"):
         compare_live(LIVE, IMAGE, BENCH[6:])
 
 
 @pytest.mark.parametrize("radius", [0.0, 8.0])
 def test_an_object_too_small_is_refused(radius: float) -> None:
     small = pictured(radius=radius)
-    with pytest.raises(DataRefused, match="are needed to fit an exposure"):
+    with pytest.raises(DataRefused, match=r"pixels in \d+ blocks"):
         compare_live(taken(small), small)
 
 
 def test_an_object_that_fills_the_picture_needs_a_picture_of_the_bench() -> None:
     full = pictured(radius=200.0)
-    with pytest.raises(DataRefused, match="covers all of the simulated picture"):
+    with pytest.raises(DataRefused, match=r"\ball\b.*picture"):
         compare_live(taken(full), full)
     assert compare_live(taken(full), full, BENCH).overlap > 0.9
 
@@ -100,10 +100,10 @@ def test_light_that_is_not_finite_is_refused() -> None:
     colour[50, 50] = np.nan
     alpha[40, 40] = np.nan
     for wrong in (replace(IMAGE, colour=colour), LinearImage(IMAGE.colour, alpha, IMAGE.depth)):
-        with pytest.raises(DataRefused, match="3 of 27648 values of the simulated picture are not finite"):
+        with pytest.raises(DataRefused, match="3 of 27648"):
             compare_live(LIVE, wrong)
 
 
 def test_a_saturated_picture_is_refused() -> None:
-    with pytest.raises(DataRefused, match="are saturated"):
+    with pytest.raises(DataRefused, match="saturated"):
         compare_live(np.full_like(LIVE, 255), IMAGE)

@@ -92,13 +92,13 @@ def test_other_pixels_see_the_same() -> None:
     [
         ({"up": (0, 0, 0)}, "zero"),
         ({"up": (0, -2.0, 0)}, "turned any way"),
-        ({"up": (0, 0, np.nan)}, "three finite"),
+        ({"up": (0, 0, np.nan)}, "finite"),
         ({"eye": (0, 0, 0)}, "zero"),
-        ({"eye": (0, np.inf, 0)}, "three finite"),
-        ({"target": (0, 1)}, "three finite"),
-        ({"field_of_view": 0.0}, "between 0 and 180"),
-        ({"field_of_view": np.pi}, "between 0 and 180"),
-        ({"field_of_view": np.nan}, "between 0 and 180"),
+        ({"eye": (0, np.inf, 0)}, "finite"),
+        ({"target": (0, 1)}, "finite"),
+        ({"field_of_view": 0.0}, "0 and 180"),
+        ({"field_of_view": np.pi}, "0 and 180"),
+        ({"field_of_view": np.nan}, "0 and 180"),
         ({"width": 0}, "one or more"),
         ({"height": -3}, "one or more"),
     ],
@@ -126,7 +126,7 @@ def test_a_focal_length_that_is_none_is_refused(focal: float) -> None:
 
 @pytest.mark.parametrize("z", [0.0, -0.1, np.nan, np.inf])
 def test_points_that_are_not_in_front_are_refused(z: float) -> None:
-    with pytest.raises(OutOfDomain, match="in front"):
+    with pytest.raises(OutOfDomain, match="1 of 2 points"):
         Pinhole(8, 8, 10.0, (4.0, 4.0), np.eye(4)).project(np.array([[0.0, 0.0, 1.0], [0.0, 0.0, z]]))
 
 

@@ -65,7 +65,7 @@ def test_an_image_that_states_more_pixels_than_a_camera_has_is_not_unpacked(
     record = StepRecord(Step(0, "press", {}), {"gel.image": reading}, 0.0)
     write_step(tmp_path / "000.mcap", record, OFFSET_NS)
     tracemalloc.start()
-    with pytest.raises(RecordingDamaged, match="does not decode"):
+    with pytest.raises(RecordingDamaged, match="decode"):
         read_step(tmp_path / "000.mcap", OFFSET_NS)
     assert tracemalloc.get_traced_memory()[1] < 1e7
     tracemalloc.stop()
@@ -85,7 +85,7 @@ def test_not_a_number_never_reaches_the_disk(tmp_path: Path) -> None:
 
 def test_a_run_is_not_overwritten(tmp_path: Path) -> None:
     Recording.create(tmp_path / "run", sample_header())
-    with pytest.raises(WrongUse, match="holds a run already"):
+    with pytest.raises(WrongUse, match="--resume"):
         Recording.create(tmp_path / "run", sample_header())
 
 
@@ -112,7 +112,7 @@ def test_a_missing_step_is_named(tmp_path: Path) -> None:
     for index in range(3):
         recording.commit(Step(index, "press", {}), [joints([[0.0] * 6])], 0.1)
     (tmp_path / "run" / "steps" / "001.mcap").unlink()
-    with pytest.raises(RecordingDamaged, match="step 1 is missing"):
+    with pytest.raises(RecordingDamaged, match="step 1 "):
         _ = recording.committed
 
 
@@ -176,7 +176,7 @@ def test_steps_are_committed_in_order_alone(tmp_path: Path) -> None:
     recording = Recording.create(tmp_path / "run", sample_header())
     recording.commit(Step(0, "press", {}), [joints([[0.0] * 6])], 0.1)
     for index in (0, 2):
-        with pytest.raises(ValueError, match=f"step {index} cannot follow 1"):
+        with pytest.raises(ValueError, match=f"step {index} .* 1 "):
             recording.commit(Step(index, "press", {}), [joints([[1.0] * 6])], 0.1)
     assert [record.readings["arm.joints"].values[0, 0] for record in recording.steps()] == [0.0]
 
@@ -187,7 +187,7 @@ def test_a_step_of_another_index_is_refused(tmp_path: Path) -> None:
         recording.commit(Step(index, "press", {}), [joints([[0.0] * 6])], 0.1)
     steps = tmp_path / "run" / "steps"
     (steps / "000.mcap").write_bytes((steps / "001.mcap").read_bytes())
-    with pytest.raises(RecordingDamaged, match=r"000\.mcap says it is step 1"):
+    with pytest.raises(RecordingDamaged, match=r"000\.mcap .*step 1"):
         recording.steps()
 
 
@@ -195,5 +195,5 @@ def test_a_folder_with_steps_and_no_header_takes_no_new_run(tmp_path: Path) -> N
     recording = Recording.create(tmp_path / "run", sample_header())
     recording.commit(Step(0, "press", {}), [joints([[0.0] * 6])], 0.1)
     (tmp_path / "run" / "run.json").unlink()
-    with pytest.raises(WrongUse, match="holds a run already"):
+    with pytest.raises(WrongUse, match="--resume"):
         Recording.create(tmp_path / "run", sample_header())

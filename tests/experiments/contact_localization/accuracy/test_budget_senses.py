@@ -109,7 +109,7 @@ def test_settings_that_need_sound_are_left_out_where_nothing_was_heard(run: Run)
     both = front(0.01, 1.0)
     assert [point.levels for point in both.fitting(unheard.unfit).points] == [TOUCH]
     assert both.fitting(run.unfit).points == both.points
-    with pytest.raises(WrongUse, match="by sound alone"):
+    with pytest.raises(WrongUse, match="contact-localization --sense touch"):
         replace(both, points=both.points[1:]).fitting(unheard.unfit)
 
 

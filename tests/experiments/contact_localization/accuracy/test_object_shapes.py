@@ -95,9 +95,9 @@ def test_a_run_hears_with_those_it_carries(of: ObjectFile, tmp_path: Path) -> No
 
 def test_another_objects_is_refused_before_anything_is_compared(of: ObjectFile) -> None:
     bigger = Mesh(1.1 * MUG.vertices, MUG.faces)
-    with pytest.raises(WrongUse, match="is not of the scene's object"):
+    with pytest.raises(WrongUse, match=r"mug\b.* 94\.78 mm.* 104\.26 mm"):
         model_of_scene(scene_of(of), STATION, bigger, CALIBRATION, at(LOWEST))
-    with pytest.raises(WrongUse, match="the scene names no ObjectFile"):
+    with pytest.raises(WrongUse, match=r"sound\.shapes = network.*\[object\].*sound\.shapes = elements"):
         model_of_scene(scene_of(None), STATION, MUG, CALIBRATION, at(LOWEST))
 
 
@@ -147,14 +147,14 @@ def test_a_budget_chooses_no_objectfile_where_the_scene_names_none() -> None:
     front = Front(tuple(points), 1.0, 6, (), "today", shipped=False)
     unfit = partial(BUDGETS.unfit, scene_of(None))
     assert [point.name for point in front.fitting(unfit).points] == ["solved"]
-    with pytest.raises(WrongUse, match="this scene names none"):
+    with pytest.raises(WrongUse, match=r"ObjectFiles.*touchstone cost contact-localization"):
         replace(front, points=(points[1],)).fitting(unfit)
 
 
 def test_an_option_names_it_beside_an_object_and_not_beside_a_scene(of: ObjectFile) -> None:
     options = SceneOptions(object="builtin:mug", objectfile=str(of.folder))
     assert resolve(options).object.objectfile == str(of.folder)
-    with pytest.raises(WrongUse, match="--objectfile and --up-axis belong to --object"):
+    with pytest.raises(WrongUse, match=r"--material.*--objectfile.*--up-axis.*--object;"):
         resolve(replace(options, object=None, scene=Path("scenes/mug_both.toml")))
 
 
@@ -165,4 +165,4 @@ def test_what_the_modes_took_is_said_by_level(of: ObjectFile) -> None:
     models = Models(make)
     models.at({SENSES.name: "both", **LOWEST})
     (said,) = preparations({"mug": models})
-    assert "sound.modes 16, sound.edge 0.35, sound.shapes network took 0." in said
+    assert "sound.modes 16, sound.edge 0.35, sound.shapes network" in said

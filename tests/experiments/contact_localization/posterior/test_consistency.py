@@ -108,18 +108,18 @@ def test_the_order_of_the_contacts_does_not_matter(six: Search, fits: list[float
 @pytest.mark.parametrize("bad", [3, 6])
 def test_a_contact_that_fits_nowhere_is_counted_and_not_passed_on_as_no_number(six: Search, bad: int) -> None:
     """Quantiles between two infinities are no numbers, and no number is below a limit."""
-    with pytest.raises(FitRefused, match="nats"):
+    with pytest.raises(FitRefused, match=r"-1000\.0 "):
         refuse_bad_fit(six, np.arange(6), np.array([-np.inf] * bad + [BAD] * (6 - bad)))
 
 
 def test_the_refusal_names_the_worst_contact_as_an_operator_counts(six: Search) -> None:
     members = np.array([0, 2, 3, 5])
-    with pytest.raises(FitRefused, match=r"the worst is contact 4 with -90\.0"):
+    with pytest.raises(FitRefused, match=r"contact 4 .*-90\.0"):
         refuse_bad_fit(six, members, np.array([BAD, BAD, -90.0, BAD]))
 
 
 def test_a_run_without_a_touch_is_refused_with_what_to_do(six: Search) -> None:
-    with pytest.raises(FitRefused, match="press deeper"):
+    with pytest.raises(FitRefused, match="background"):
         refuse_bad_fit(six, np.empty(0, np.int64), np.empty(0))
 
 
@@ -161,7 +161,7 @@ def test_an_object_inside_out_is_refused_and_one_that_is_not_is_not(
     members = np.arange(len(PRESSES))
     refuse_inside_out(search, truth, members)
     inverted = Model(Mesh(block.mesh.vertices, block.mesh.faces[:, ::-1]), block.sensor, block.calibration)
-    with pytest.raises(FitRefused, match=r"inside out.*contact \d.*turn the faces"):
+    with pytest.raises(FitRefused, match=r"contact \d.* 0 degrees.* 90 "):
         refuse_inside_out(Search(contacts, inverted, prior, 3e-3, Noise()), truth, members)
 
 
@@ -175,7 +175,7 @@ def test_a_contact_of_two_that_seems_to_be_from_inside_is_no_object_inside_out(
     search = Search(contacts, partly, prior, 3e-3, Noise())
     truth = Hypotheses(PRESSES[0].object_from_gel[None, :3, 3], np.zeros(1), np.zeros(1))
     refuse_inside_out(search, truth, np.array([1, 2]))
-    with pytest.raises(FitRefused, match="inside out"):
+    with pytest.raises(FitRefused, match=r"contact \d.* 0 degrees.* 90 "):
         refuse_inside_out(search, truth, np.array([1]))
 
 
@@ -192,5 +192,5 @@ def test_a_lone_contact_beside_a_thin_wall_does_not_say_that_the_object_is_insid
         if walled:
             refuse_inside_out(search, top, one)
         else:
-            with pytest.raises(FitRefused, match="inside out"):
+            with pytest.raises(FitRefused, match=r"contact \d.* 0 degrees.* 90 "):
                 refuse_inside_out(search, top, one)

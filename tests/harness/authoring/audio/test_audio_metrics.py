@@ -59,7 +59,7 @@ def test_what_cannot_be_compared_is_refused(
     found: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
     reference: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
 ) -> None:
-    with pytest.raises(WrongUse, match="cannot be compared"):
+    with pytest.raises(WrongUse, match=r"shapes \(\d+,\) and \(\d+,\)"):
         sound_distances(found, reference)
 
 

@@ -46,10 +46,10 @@ def test_a_killed_training_ends_in_the_same_bits(egg: Modes, tmp_path: Path, bra
 def test_a_checkpoint_of_another_training_is_refused(egg: Modes, tmp_path: Path) -> None:
     trained = split_nodes(len(egg.points)).trained
     AudioTraining(TINY, egg, trained, seed=3).save(tmp_path / "kept.npz")
-    with pytest.raises(DataRefused, match="another network"):
+    with pytest.raises(DataRefused, match=r"kept\.npz.*seed"):
         AudioTraining(TINY, egg, trained, seed=4).load(tmp_path / "kept.npz")
     (tmp_path / "kept.npz").write_bytes(b"PK\x03\x04 half a file")
-    with pytest.raises(DataRefused, match="cannot be read"):
+    with pytest.raises(DataRefused, match=r"kept\.npz.*archive"):
         AudioTraining(TINY, egg, trained, seed=3).load(tmp_path / "kept.npz")
 
 

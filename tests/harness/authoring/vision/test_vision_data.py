@@ -123,7 +123,7 @@ def test_an_open_sheet_is_learned_from_both_sides() -> None:
 
 def test_an_object_inside_out_is_refused() -> None:
     mesh = ball(0.05, 2)
-    with pytest.raises(OutOfDomain, match="inside out"):
+    with pytest.raises(OutOfDomain, match=r"\b0 of \d+"):
         draw_tuples(LitObject(plain(Mesh(mesh.vertices, mesh.faces[:, ::-1]), GREY)), 10, 0, NOTHING)
 
 
@@ -146,14 +146,14 @@ def test_pictures_kept_back_are_lit_from_the_side_of_the_camera(mug: LitObject) 
 
 def test_bad_questions_are_refused(mug: LitObject) -> None:
     mesh = mug.appearance.mesh
-    with pytest.raises(WrongUse, match="one or more"):
+    with pytest.raises(WrongUse, match=r"\b0 pictures"):
         held_out_pictures(mesh, 0, 8, 8, 0)
-    with pytest.raises(WrongUse, match="half a diagonal"):
+    with pytest.raises(WrongUse, match=r"0\.4 diagonals"):
         held_out_pictures(mesh, 1, 8, 8, 0, distance=0.4)
-    with pytest.raises(WrongUse, match="one light"):
+    with pytest.raises(WrongUse, match=r"1 cameras.*0 lights"):
         HeldOutViews(held_out_pictures(mesh, 1, 8, 8, 0).cameras, ())
     with pytest.raises(WrongUse, match="45 deg"):
         HeldOutViews((), (), 1.0)
     everywhere = held_out_pictures(mesh, 200, 8, 8, 0, apart=0.7)
-    with pytest.raises(OutOfDomain, match="keep back fewer"):
+    with pytest.raises(OutOfDomain, match=r"\b0 of 1 views.*200 .* deg"):
         draw_views(mesh, 1, 8, 8, 0, everywhere)

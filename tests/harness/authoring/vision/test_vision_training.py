@@ -59,10 +59,10 @@ def test_a_checkpoint_of_another_training_is_refused(
     kept = tmp_path / "kept.npz"
     trained.save(kept)
     for other in (training_of(lit, seed=4), training_of(lit, replace(TINY, rate=2e-3))):
-        with pytest.raises(DataRefused, match="another network, object, data or seed"):
+        with pytest.raises(DataRefused, match="seed"):
             other.load(kept)
     kept.write_bytes(b"PK\x03\x04")
-    with pytest.raises(DataRefused, match="delete it to begin anew"):
+    with pytest.raises(DataRefused, match="checkpoint"):
         training_of(lit).load(kept)
 
 

@@ -60,10 +60,10 @@ def test_single_precision_gives_the_same_surface() -> None:
 @pytest.mark.parametrize(
     ("field", "words"),
     [
-        (np.full((3, 3, 3), np.nan), "27 numbers not finite"),
+        (np.full((3, 3, 3), np.nan), "27 .*finite"),
         (np.ones((3, 3)), r"shape \(3, 3\)"),
         (np.ones((0, 3, 3)), r"shape \(0, 3, 3\)"),
-        (np.ones((3, 3, 3)), "no corner of a grid"),
+        (np.ones((3, 3, 3)), "corner"),
     ],
 )
 def test_a_field_without_a_surface_is_refused(field: FloatArray, words: str) -> None:

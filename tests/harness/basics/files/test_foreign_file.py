@@ -29,7 +29,7 @@ def test_an_archive_that_unpacks_to_gigabytes_is_not_unpacked(hostile: dict[str,
     path = hostile["zeros.npz"]
     assert path.stat().st_size < 5e6
     tracemalloc.start()
-    with pytest.raises(CalibrationRefused, match=r"zeros\.npz unpacks to 4,096 MiB"):
+    with pytest.raises(CalibrationRefused, match=r"zeros\.npz .*4,096 MiB"):
         read_arrays(path, "a calibration")
     assert tracemalloc.get_traced_memory()[1] < BOUND
     tracemalloc.stop()
@@ -65,18 +65,18 @@ def test_arrays_read_back(tmp_path: Path) -> None:
 def test_a_picture_of_more_pixels_than_a_camera_has_is_not_unpacked(
     hostile: dict[str, Path], name: str
 ) -> None:
-    with pytest.raises(DataRefused, match=rf"{name} states .* at most 33,554,432"):
+    with pytest.raises(DataRefused, match=rf"{name} .*33,554,432"):
         read_image(hostile[name])
 
 
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("deep.toml", "more than 32 deep"),
-        ("deep_tables.toml", "more than 32 deep"),
-        ("many.toml", "at most 1 MiB"),
-        ("zero.toml", "a device"),
-        ("folder.obj", "is a directory"),
+        ("deep.toml", "32 deep"),
+        ("deep_tables.toml", "32 deep"),
+        ("many.toml", "1 MiB"),
+        ("zero.toml", "device"),
+        ("folder.obj", "directory"),
         ("absent.toml", "no such file"),
     ],
 )
@@ -88,7 +88,7 @@ def test_text_that_no_person_wrote(hostile: dict[str, Path], name: str, why: str
 def test_a_file_of_many_values_is_not_one_of_ours(tmp_path: Path) -> None:
     path = tmp_path / "many.toml"
     path.write_text("".join(f"k{n}=1\n" for n in range(10_001)))
-    with pytest.raises(WrongUse, match="more than 10,000 values"):
+    with pytest.raises(WrongUse, match="10,000 values"):
         read_toml(path)
 
 
@@ -128,7 +128,7 @@ def test_an_archive_of_zip64_is_bounded_by_its_own_record(
     if fits:
         require_unpackable(path, "an archive")
     else:
-        with pytest.raises(DataRefused, match="lists far more members"):
+        with pytest.raises(DataRefused, match="members"):
             require_unpackable(path, "an archive")
 
 
@@ -145,5 +145,5 @@ def test_the_members_of_an_archive_are_counted_together(
     if fits:
         require_unpackable(path, "an archive")
     else:
-        with pytest.raises(DataRefused, match=r"some\.zip unpacks to"):
+        with pytest.raises(DataRefused, match=r"some\.zip .* MiB"):
             require_unpackable(path, "an archive")

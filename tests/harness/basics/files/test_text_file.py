@@ -40,7 +40,7 @@ def test_text_that_is_not_utf_8_is_refused_with_its_line(tmp_path: Path) -> None
     (tmp_path / "some.txt").write_bytes(
         "one\rtwo\rM\N{LATIN SMALL LETTER U WITH DIAERESIS}ller".encode("latin-1")
     )
-    with pytest.raises(DataRefused, match=r"some\.txt, line 3: the byte 0xfc is not UTF-8"):
+    with pytest.raises(DataRefused, match=r"some\.txt, line 3: .*0xfc .*UTF-8"):
         read_text(tmp_path / "some.txt", "a text")
     assert read_text_bytes(tmp_path / "some.txt", "a text").endswith(b"\nM\xfcller")
 
@@ -49,7 +49,7 @@ def test_text_that_is_not_utf_8_is_refused_with_its_line(tmp_path: Path) -> None
 def test_a_damaged_gzip_file_is_refused(cut: int, tmp_path: Path) -> None:
     data = gzip.compress(bytes(range(256)) * 40)
     (tmp_path / "some.gz").write_bytes(data[:-cut])
-    with pytest.raises(DataRefused, match="damaged or incomplete gzip"):
+    with pytest.raises(DataRefused, match=r"some\.gz .*gzip"):
         read_text(tmp_path / "some.gz", "a text")
 
 
@@ -57,12 +57,12 @@ def test_a_gzip_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
     member = gzip.compress(bytes(2**24))
     (tmp_path / "some.gz").write_bytes(member * 64)  # 1 GiB in 1 MiB
     begun = time.process_time()
-    with pytest.raises(WrongUse, match=r"unpacks to more than 1 MiB; a scene has at most that"):
+    with pytest.raises(WrongUse, match=r"some\.gz .*1 MiB"):
         read_text(tmp_path / "some.gz", "a scene", 2**20, WrongUse)
     assert time.process_time() - begun < 1.0
 
 
 def test_damaged_utf_16_is_refused(tmp_path: Path) -> None:
     (tmp_path / "some.txt").write_bytes(codecs.BOM_UTF16_LE + b"a\0b")
-    with pytest.raises(DataRefused, match="damaged UTF-16-LE text"):
+    with pytest.raises(DataRefused, match="UTF-16-LE"):
         read_text(tmp_path / "some.txt", "a text")

@@ -122,7 +122,7 @@ def test_a_camera_opens_alone(tmp_path: Path, station: Station, fakes: type[Fake
     assert fakes.log == ["gel open", "gel read", "gel close"]
 
 
-@pytest.mark.parametrize(("name", "words"), [("gle", "did you mean 'gel'"), ("scene", "no \\[camera\\]")])
+@pytest.mark.parametrize(("name", "words"), [("gle", "'gle'.*'gel'"), ("scene", r"\[camera\]")])
 def test_a_camera_that_is_not_there_is_wrong_use(
     name: str, words: str, tmp_path: Path, station: Station
 ) -> None:

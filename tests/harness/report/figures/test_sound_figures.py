@@ -121,5 +121,5 @@ def test_a_sense_without_an_answer_leaves_the_object_bare() -> None:
 
 def test_no_sense_is_no_picture() -> None:
     mesh = build("mug")
-    with pytest.raises(ValueError, match="of one at least"):
+    with pytest.raises(ValueError, match="posterior"):
         senses_figure(object_sides(mesh, mesh.vertices[0], 40).shots, {})

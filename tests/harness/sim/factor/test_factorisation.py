@@ -193,7 +193,7 @@ def test_a_singular_matrix_is_refused() -> None:
     circle = 2.0 * np.eye(50) - np.roll(np.eye(50), 1, axis=0) - np.roll(np.eye(50), -1, axis=0)
     for matrix in (lone, sp.csc_array(circle)):
         plan = elimination(matrix)
-        with pytest.raises(MeshRefused, match=r"cannot be factorised: unknown \d+ .* mesh the object again"):
+        with pytest.raises(MeshRefused, match=r"unknown \d+ .*pivot"):
             factorised(matrix, plan)
         assert inertia(matrix, plan) is None
 
@@ -212,7 +212,7 @@ def test_what_is_not_a_number_is_refused() -> None:
 
 
 def test_entries_outside_the_plan_are_refused() -> None:
-    with pytest.raises(WrongUse, match="entries where its plan has none"):
+    with pytest.raises(WrongUse, match="pattern"):
         factorised(sp.csc_array(np.ones((4, 4)) + 9.0 * np.eye(4)), elimination(sp.csc_array(np.eye(4))))
 
 
@@ -228,7 +228,7 @@ def test_other_than_doubles_are_refused() -> None:
 @pytest.mark.parametrize("shape", [(27,), (26, 2), (27, 2, 1)])
 def test_blocks_of_another_shape_are_refused(shape: tuple[int, ...]) -> None:
     matrix = grid(3)
-    with pytest.raises(WrongUse, match="must be"):
+    with pytest.raises(WrongUse, match="columns"):
         factorised(matrix, elimination(matrix)).solve(np.ones(shape))
 
 

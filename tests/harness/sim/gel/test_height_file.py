@@ -39,7 +39,7 @@ def test_metres_are_handed_on(tmp_path: Path, kind: Any) -> None:
 def test_nothing_below_an_object_is_asked_about_but_a_gel_may_only_bulge_a_little(tmp_path: Path) -> None:
     far = written(tmp_path, bump(1e-3) - 0.3)  # an object a foot away has no contact
     assert read_heights(far, SENSOR).heights.max() < 0.0
-    with pytest.raises(OutOfDomain, match="thick"):
+    with pytest.raises(OutOfDomain, match=r" m .*2\.5 mm"):
         read_heights(far, SENSOR, "gel")
     assert read_heights(written(tmp_path, bump(1e-3) - 0.1e-3), SENSOR, "gel").heights.min() < 0.0
 
@@ -61,7 +61,7 @@ def test_pixels_are_named(deepest: float) -> None:
 
 def assert_refused_for_unit(heights: FloatArray, sensor: TactileSensor, unit: str) -> None:
     for of in ("object", "gel"):
-        with pytest.raises(OutOfDomain, match="write metres") as refused:
+        with pytest.raises(OutOfDomain, match=r" m .* mm") as refused:
             given_heights(heights, sensor, "gel" if of == "gel" else "object", "h.npy")
         assert unit in str(refused.value)
 
@@ -74,9 +74,9 @@ def test_taxims_published_surface_is_told_for_pixels() -> None:
 
 def test_beyond_the_gel_is_for_the_caller_to_hold_but_not_far_beyond() -> None:
     given_heights(bump(4e-3), SENSOR, "object", "h.npy")
-    with pytest.raises(OutOfDomain, match=r"reach 0\.004 m and the gel is 2\.5 mm thick"):
+    with pytest.raises(OutOfDomain, match=r"0\.004 m .*2\.5 mm"):
         given_heights(bump(4e-3), SENSOR, "gel", "h.npy")
-    with pytest.raises(OutOfDomain, match="reach"):
+    with pytest.raises(OutOfDomain, match=r"0\.011 m .*2\.5 mm"):
         given_heights(bump(11e-3), SENSOR, "object", "h.npy")
 
 
@@ -98,7 +98,7 @@ def test_what_is_no_height_is_masked_and_the_rest_as_it_was(bad: float) -> None:
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e9])
 def test_a_map_without_a_height_is_refused_by_name(bad: float) -> None:
-    with pytest.raises(OutOfDomain, match=r"h\.npy: none of its 19200 heights"):
+    with pytest.raises(OutOfDomain, match=r"h\.npy: .*19200"):
         given_heights(np.full((120, 160), bad), SENSOR, "object", "h.npy")
 
 
@@ -106,7 +106,7 @@ def test_what_is_missing_hides_no_wrong_unit_and_no_wrong_sign() -> None:
     holed = np.where(bump(1e-3) > 0.9e-3, np.nan, bump(1e-3))
     with pytest.raises(OutOfDomain, match="millimetres"):
         given_heights(holed * 1e3, SENSOR, "object", "h.npy")
-    with pytest.raises(OutOfDomain, match="turn the sign"):
+    with pytest.raises(OutOfDomain, match=r"-\d.* mm.*sign"):
         given_heights(-holed, SENSOR, "gel", "h.npy")
 
 
@@ -138,8 +138,8 @@ def test_a_span_stays_between_what_holds_it_and_lies_in_its_plane(seed: int, sha
 @pytest.mark.parametrize(
     ("shape", "hint"),
     [
-        ((160, 120), "transpose it"),
-        ((1, 120, 160), "one contact"),
+        ((160, 120), r"\(160, 120\).*transpose"),
+        ((1, 120, 160), r"\(1, 120, 160\)"),
         ((480, 640), r"\(120, 160\)"),
         ((5,), "h.npy"),
     ],
@@ -150,22 +150,22 @@ def test_another_shape_is_refused(shape: tuple[int, ...], hint: str) -> None:
 
 
 def test_a_gel_that_only_bulges_has_its_sign_the_wrong_way() -> None:
-    with pytest.raises(OutOfDomain, match="turn the sign"):
+    with pytest.raises(OutOfDomain, match=r"-\d.* mm.*sign"):
         given_heights(-bump(1e-3), SENSOR, "gel", "h.npy")
     given_heights(np.zeros((120, 160)), SENSOR, "gel", "h.npy")
 
 
 def test_what_is_no_array_of_heights_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="there is no height map"):
+    with pytest.raises(WrongUse, match=r"absent\.npy"):
         read_heights(tmp_path / "absent.npy", SENSOR)
     (tmp_path / "h.png").touch()
     with pytest.raises(DataRefused, match=r"\.npy"):
         read_heights(tmp_path / "h.png", SENSOR)
     (tmp_path / "h.npy").write_bytes(b"")
-    with pytest.raises(DataRefused, match="does not read"):
+    with pytest.raises(DataRefused, match=r"h\.npy .*archive|h\.npy .*read"):
         read_heights(tmp_path / "h.npy", SENSOR)
     for array in (np.zeros((120, 160), np.uint8), np.zeros((120, 160), np.complex128)):
         with pytest.raises(DataRefused, match="floating-point"):
             read_heights(written(tmp_path, array), SENSOR)
-    with pytest.raises(DataRefused, match="does not read"):
+    with pytest.raises(DataRefused, match=r"h\.npy.*read"):
         read_heights(written(tmp_path, np.array([{"a": 1}], dtype=object)), SENSOR)

@@ -87,7 +87,7 @@ def test_near_the_push_the_layer_is_boussinesq_s_half_space() -> None:
 
 
 def test_kernels_that_cannot_be_are_refused() -> None:
-    with pytest.raises(OutOfDomain, match="cannot be"):
+    with pytest.raises(OutOfDomain, match=r"0\.0 m, .*0\.001 m .*0\.01 m"):
         layer_kernel(0.0, 1e-3, 1e-2)
     with pytest.raises(OutOfDomain, match="thicknesses"):
         layer_kernel(1e-3, 1e-4, 1.0)
@@ -143,12 +143,12 @@ def test_a_batch_is_the_contacts_one_by_one_and_a_full_contact_is_finite() -> No
 
 
 def test_what_is_no_press_on_this_gel_is_refused() -> None:
-    with pytest.raises(OutOfDomain, match="this sensor's"):
+    with pytest.raises(OutOfDomain, match=r"\(1, 120, 161\)"):
         marker_displacements(np.zeros((1, 120, 161)), DOTTED)
     for bad in (np.nan, np.inf, -1e-6):
-        with pytest.raises(OutOfDomain, match="negative or not finite"):
+        with pytest.raises(OutOfDomain, match="negative"):
             marker_displacements(np.full((1, 120, 160), bad), DOTTED)
-    with pytest.raises(WrongUse, match="no markers"):
+    with pytest.raises(WrongUse, match="MarkerGrid"):
         marker_displacements(np.zeros((1, 120, 160)), GELSIGHT_R15)
 
 
@@ -218,7 +218,7 @@ def test_the_closed_form_is_the_least_squares_fit_of_every_node() -> None:
     loads, responses = rng.normal(size=(5, 3)), rng.normal(size=(5, 40, 3))
     each = [np.linalg.lstsq(loads, responses[:, n], rcond=None)[0].T for n in range(40)]
     assert np.allclose(fit_tensors(loads, responses), each, atol=1e-12)
-    with pytest.raises(CalibrationRefused, match="three directions"):
+    with pytest.raises(CalibrationRefused, match="directions"):
         fit_tensors(np.tile([0.0, 0.0, 1.0], (5, 1)), responses)
     with pytest.raises(CalibrationRefused, match="finite"):
         fit_tensors(loads, responses * np.nan)

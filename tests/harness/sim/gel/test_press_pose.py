@@ -112,12 +112,10 @@ def test_places_near_and_far_are_the_nearest_of_all() -> None:
 
 
 def test_a_point_off_the_surface_is_refused_with_its_distance() -> None:
-    off = (
-        r"5 mm off the surface; the limit is 2 mm; give a point of the surface, as the nearest, 0.001 0 0.02 "
-    )
+    off = r"5 mm .* 2 mm.*0.001 0 0.02 "
     with pytest.raises(OutOfDomain, match=off):
         contact_place(BOX, np.array([0.001, 0.0, 0.025]))
-    with pytest.raises(OutOfDomain, match="read as millimetres it would be on it"):
+    with pytest.raises(OutOfDomain, match="millimetres"):
         contact_place(BOX, np.array([10.0, 10.0, 20.0]))
     assert MOST_MOVED == 2e-3
     for bad in ([0.0, 0.0, np.nan], [0.0, 0.0]):

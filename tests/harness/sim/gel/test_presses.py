@@ -42,7 +42,7 @@ def test_a_part_of_a_batch_is_a_batch() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [({"depths": np.zeros(3)}, "shapes"), ({"tilts": np.full(9, np.nan)}, "finite"),
-     ({"normals": np.ones((9, 3))}, "divide each by its length")],
+     ({"normals": np.ones((9, 3))}, "length")],
 )  # fmt: skip
 def test_what_is_no_press_is_refused(change: dict[str, np.ndarray], said: str) -> None:
     presses = some(9)

@@ -270,9 +270,9 @@ def _bomb() -> bytes:
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"", "no picture"),
-        (b"not a picture", "no picture"),
-        (png(PRINT)[:40], "damaged|no picture"),
+        (b"", "picture"),
+        (b"not a picture", "picture"),
+        (png(PRINT)[:40], "damaged|picture"),
         (_bomb(), "pixels"),
     ],
 )

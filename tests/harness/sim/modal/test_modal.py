@@ -270,11 +270,11 @@ def test_what_cannot_vibrate_is_named(beam: Tetrahedra) -> None:
         tetrahedra(sliver, np.concatenate([beam.cells, [[0, 1, 2, len(beam.nodes)]]]))
     with pytest.raises(MeshRefused, match="finite"):
         tetrahedra(np.full_like(beam.nodes, np.nan), beam.cells)
-    with pytest.raises(MeshRefused, match="shared by more than two"):
+    with pytest.raises(MeshRefused, match="faces"):
         tetrahedra(beam.nodes, np.concatenate([beam.cells, beam.cells[:1]]))
     with pytest.raises(WrongUse, match="above 0"):
         solve_modes(beam, STEEL, 0.0)
-    with pytest.raises(WrongUse, match="Poisson"):
+    with pytest.raises(WrongUse, match=r"0.5"):
         solve_modes(beam, replace(STEEL, poisson=0.5), 1e3)
 
 

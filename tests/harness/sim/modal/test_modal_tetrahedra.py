@@ -69,7 +69,7 @@ def test_a_thin_shell_stays_hollow() -> None:
     found = tetrahedralize(hollow, 0.012)
     assert found.volumes.sum() == pytest.approx(enclosed_volume(hollow), rel=0.1)
     assert found.volumes.sum() < 0.4 * enclosed_volume(sphere(0.03))
-    with pytest.raises(WrongUse, match="close up"):
+    with pytest.raises(WrongUse, match=r"1\.5 mm.* mm"):
         tetrahedralize(hollow, 0.012, envelope=1.5e-3)
 
 
@@ -91,7 +91,7 @@ def test_the_outside_of_a_hollow_thing_gains_a_cavity() -> None:
     assert enclosed_volume(hollow) == pytest.approx(exact, rel=0.04)
     assert thin_wall(hollow, 0.5) == pytest.approx(2e-3, rel=0.05)
     assert walled(outside, None) is outside
-    with pytest.raises(MeshRefused, match="no cavity"):
+    with pytest.raises(MeshRefused, match=r"29\.9 mm"):
         walled(outside, 0.0299)
 
 
@@ -129,7 +129,7 @@ def test_the_nearest_place_looks_the_right_way() -> None:
 
 def test_edges_that_cannot_be_are_refused() -> None:
     for edge in (0.0, np.nan, 1.0):
-        with pytest.raises(WrongUse, match="element edge"):
+        with pytest.raises(WrongUse, match=r"element edge .* mm"):
             tetrahedralize(sphere(0.03), edge)
 
 
@@ -145,12 +145,12 @@ def test_cells_kept_nearer_to_the_surface_hold_its_volume_better() -> None:
 def test_an_envelope_that_closes_a_wall_up_is_refused(reach: float) -> None:
     """The plate's wall is 3.43 mm thick, and a quarter of it is left."""
     for edge in (None, 0.02):
-        with pytest.raises(WrongUse, match=r"above 0 and up to 0\.858 mm"):
+        with pytest.raises(WrongUse, match=r"0\.858 mm"):
             modes_of_file("builtin:plate", CERAMIC, count=3, edge=edge, envelope=reach)
 
 
 def test_an_edge_that_needs_too_many_elements_is_refused_with_the_shortest() -> None:
-    with pytest.raises(WrongUse, match="elements; at most 5,000,000 are made") as refused:
+    with pytest.raises(WrongUse, match="5,000,000") as refused:
         tetrahedralize(sphere(0.03), 1e-6)
     # A ball of 113.1 cm^3 holds 5,000,000 regular tetrahedra of 0.577 mm.
     assert 0.57 < float(str(refused.value).split()[-2]) < 0.59

@@ -231,7 +231,7 @@ def test_the_tapered_membrane_of_nafems() -> None:
 
 def test_supports_that_leave_nothing_or_fit_nothing_are_refused() -> None:
     cube = exact_box((0.1, 0.1, 0.1), (1, 1, 1))
-    with pytest.raises(WrongUse, match="nothing can vibrate"):
+    with pytest.raises(WrongUse, match=r"held.*free"):
         solve_mesh(cube, STEEL, 1e3, held=np.ones(cube.nodes.shape, dtype=np.bool_))
     with pytest.raises(WrongUse, match="held"):
         solve_mesh(cube, STEEL, 1e3, held=np.ones((3, 3), dtype=np.bool_))

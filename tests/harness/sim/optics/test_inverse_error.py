@@ -166,7 +166,7 @@ def test_no_contact_has_only_the_floor(bench: TactileCalibration) -> None:
 
 
 def test_what_makes_no_sense_is_refused(images: ByteArray, depth: Depth) -> None:
-    with pytest.raises(DataRefused, match="pictures that were read"):
+    with pytest.raises(DataRefused, match=r"images are \(2, "):
         height_errors(images[:2], depth)
-    with pytest.raises(DataRefused, match="at least 2"):
+    with pytest.raises(DataRefused, match=r"\b1 draws"):
         height_errors(images, depth, ColourError(draws=1))

@@ -84,12 +84,12 @@ def test_damage_is_refused(lit: LitCalibration, tmp_path: Path) -> None:
         good = {name: archive[name] for name in archive.files}
     cases = [
         ("not what was written", {"lit": 2.0 * good["lit"]}),
-        ("lit is float64", {"lit": good["lit"][:-1]}),
-        ("not finite", {"lit": np.full_like(good["lit"], np.nan)}),
+        ("lit .*float64", {"lit": good["lit"][:-1]}),
+        ("finite", {"lit": np.full_like(good["lit"], np.nan)}),
         ("holds", {"support": None}),
         ("holds", {"mood": good["lit"]}),
-        ("readable header", {"header": np.array("{")}),
-        ("does not read", {"lit": np.array([{}], dtype=object)}),
+        ("header", {"header": np.array("{")}),
+        ("a.npz", {"lit": np.array([{}], dtype=object)}),
     ]
     for words, change in cases:
         np.savez(path, **{k: v for k, v in (good | change).items() if v is not None})
@@ -131,15 +131,15 @@ def test_a_file_of_before_errors_were_measured_reads_and_says_none(
     ids=["below zero", "no number", "double", "a column short"],
 )
 def test_errors_that_cannot_be_are_refused(lit: LitCalibration, errors: Any) -> None:
-    with pytest.raises(CalibrationRefused, match="uncertainty is"):
+    with pytest.raises(CalibrationRefused, match="uncertainty"):
         dataclasses.replace(lit, uncertainty=errors)
 
 
 def test_a_file_of_one_array_is_named_for_what_it_is(tmp_path: Path) -> None:
     np.save(tmp_path / "heights.npy", np.zeros((3, 3)))
-    with pytest.raises(CalibrationRefused, match=r"heights.npy does not read .* no \.npz archive; give"):
+    with pytest.raises(CalibrationRefused, match=r"heights.npy .* \.npz"):
         read_calibration(tmp_path / "heights.npy")
-    with pytest.raises(WrongUse, match="there is no calibration"):
+    with pytest.raises(WrongUse, match=r"absent\.npz"):
         read_calibration(tmp_path / "absent.npz")
 
 

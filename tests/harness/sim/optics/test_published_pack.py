@@ -109,14 +109,14 @@ def test_what_the_files_do_not_say_is_asked_for(tmp_path: Path) -> None:
     folder = str(write_pack(tmp_path / "pack"))
     with pytest.raises(WrongUse, match="--pitch"):
         known_gel(None, folder)
-    with pytest.raises(WrongUse, match=r"no known sensor has 24 x 32 pixels of 0.1 mm; say how thick"):
+    with pytest.raises(WrongUse, match=r"24 x 32 pixels of 0.1 mm.*--thickness"):
         known_gel(None, folder, pitch=PITCH)
     gel = known_gel(None, folder, pitch=PITCH, thickness=2e-3)
     assert (gel.sensor.rows, gel.sensor.columns, gel.sensor.pitch) == (24, 32, PITCH)
     assert (gel.sensor.gel_thickness, gel.sensor.casts_shadow) == (2e-3, False)
-    with pytest.raises(WrongUse, match=r"has pixels of 0.1245 mm"):
+    with pytest.raises(WrongUse, match=r"0\.1245 mm.*0\.1 mm"):
         known_gel("gelsight-r1.5", folder, pitch=PITCH)
-    with pytest.raises(DataRefused, match=r"24 x 32 pixels and GelSight R1.5"):
+    with pytest.raises(DataRefused, match=r"24 x 32 pixels.*GelSight R1\.5"):
         known_gel("gelsight-r1.5", folder)
 
 
@@ -141,12 +141,12 @@ def test_what_is_no_pack_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CalibrationRefused, match="pitch"):
         read_published(folder, 0.0)
     np.save(folder / "gelmap5.npy", np.zeros((5, 5)))
-    with pytest.raises(CalibrationRefused, match="remove it"):
+    with pytest.raises(CalibrationRefused, match=r"gelmap5\.npy"):
         read_published(folder, PITCH)
     (folder / "gelmap5.npy").unlink()
     cases: list[tuple[str, dict[str, Any]]] = [
         ("has no", {"bins": BINS}),
-        ("tables of", dict.fromkeys(("grad_r", "grad_g", "grad_b"), np.zeros((3, 3, 6))) | {"bins": BINS}),
+        (r"\(3, 3, 6\)", dict.fromkeys(("grad_r", "grad_g", "grad_b"), np.zeros((3, 3, 6))) | {"bins": BINS}),
         ("finite", dict.fromkeys(("grad_r", "grad_g", "grad_b"), np.full((2, 2, 6), np.nan)) | {"bins": 2}),
     ]
     for words, arrays in cases:
@@ -155,10 +155,10 @@ def test_what_is_no_pack_is_refused(tmp_path: Path) -> None:
             read_published(folder, PITCH)
     write_pack(folder)
     np.savez(folder / "dataPack.npz", f0=np.zeros((24, 32)))
-    with pytest.raises(CalibrationRefused, match="colour picture"):
+    with pytest.raises(CalibrationRefused, match=r"dataPack\.npz: f0"):
         read_published(folder, PITCH)
     np.save(folder / "array.npy", np.zeros(3))
     for content in (b"no archive", (folder / "array.npy").read_bytes()):
         (folder / "dataPack.npz").write_bytes(content)
-        with pytest.raises(CalibrationRefused, match="does not read"):
+        with pytest.raises(CalibrationRefused, match=r"dataPack\.npz"):
             read_published(folder, PITCH)

@@ -86,24 +86,24 @@ def test_nothing_in_a_file_is_run(tmp_path: Path) -> None:
     lists = as_published()
     lists[1, 2, 1] = [Trap()]
     np.savez(tmp_path / "a.npz", shadowDirections=DIRECTIONS, shadowTable=lists)
-    with pytest.raises(CalibrationRefused, match="nothing else"):
+    with pytest.raises(CalibrationRefused, match=r"shadowTable\.npy|float64"):
         read_shadow_table(tmp_path / "a.npz")
     assert not Trap.sprung
 
 
 def test_what_is_no_shadow_table_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
-    with pytest.raises(CalibrationRefused, match="does not read"):
+    with pytest.raises(CalibrationRefused, match=r"a\.npz"):
         read_shadow_table(path)
     path.write_bytes(b"not an archive")
-    with pytest.raises(CalibrationRefused, match="does not read"):
+    with pytest.raises(CalibrationRefused, match=r"a\.npz .*(damaged|archive)"):
         read_shadow_table(path)
     cases: list[tuple[str, dict[str, Any]]] = [
         ("holds", {"directions": DIRECTIONS}),
         ("3 channels", {"shadowDirections": DIRECTIONS[:4], "shadowTable": as_published()}),
         ("lists in the order", {"shadowDirections": DIRECTIONS, "shadowTable": LENGTHS}),
         ("f4", {"shadowDirections": DIRECTIONS, "shadowTable": as_published(np.float32)}),
-        ("lists of float64", {"shadowDirections": DIRECTIONS, "shadowTable": as_published(whole)}),
+        ("float64", {"shadowDirections": DIRECTIONS, "shadowTable": as_published(whole)}),
         ("samples", {"directions": DIRECTIONS, "lengths": LENGTHS, "values": np.zeros(7)}),
     ]
     for words, arrays in cases:

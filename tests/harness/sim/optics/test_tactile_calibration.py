@@ -51,7 +51,7 @@ def test_a_misfit_is_stated_where_it_was_measured_alone(bench: TactileCalibratio
     ("rms", "alike"), [(np.nan, 0.2), (-1.0, 0.2), (np.inf, 0.2), (1.0, 0.0), (1.0, np.nan)]
 )
 def test_a_misfit_that_cannot_be_is_refused(rms: float, alike: float) -> None:
-    with pytest.raises(CalibrationRefused, match="misfit of"):
+    with pytest.raises(CalibrationRefused, match="misfit"):
         ColourMisfit(rms, alike)
 
 
@@ -95,12 +95,12 @@ def test_what_was_tampered_with_is_refused(bench: TactileCalibration, tmp_path: 
     cases: list[tuple[str, Any]] = [
         ("not what was written", {"background": 255 - bench.background}),
         ("holds", {"support": None}),
-        ("not finite", {"table": bad}),
-        ("table is", {"table": bench.table.astype(np.float64)}),
+        ("finite", {"table": bad}),
+        ("table .*float64", {"table": bench.table.astype(np.float64)}),
         ("schema 99", {"header": {"schema": 99}}),
-        ("only RGB", {"header": {"channel_order": "BGR"}}),
-        ("header keys", {"header": {"mood": "good"}}),
-        ("cannot be", {"header": {"pitch": -1.0}}),
+        ("RGB", {"header": {"channel_order": "BGR"}}),
+        ("mood", {"header": {"mood": "good"}}),
+        ("pitch -1", {"header": {"pitch": -1.0}}),
     ]
     for words, change in cases:
         save_calibration(bench, path)
@@ -114,17 +114,17 @@ def test_what_was_tampered_with_is_refused(bench: TactileCalibration, tmp_path: 
 def test_what_is_no_calibration_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "d.npz"
     path.write_bytes(b"not an archive")
-    with pytest.raises(CalibrationRefused, match="does not read"):
+    with pytest.raises(CalibrationRefused, match=r"\.npz"):
         load_calibration(path)
-    with pytest.raises(CalibrationRefused, match="does not read"):
+    with pytest.raises(CalibrationRefused, match=r"absent\.npz"):
         load_calibration(tmp_path / "absent.npz")
-    with pytest.raises(CalibrationRefused, match="there are gelsight_r15_bench"):
+    with pytest.raises(CalibrationRefused, match=r"'gelsight_r16'.*gelsight_r15_bench"):
         shipped_calibration("gelsight_r16")
 
 
 def test_an_array_alone_is_no_calibration(tmp_path: Path) -> None:
     np.save(tmp_path / "heights.npy", np.zeros((2, 3)))
-    with pytest.raises(CalibrationRefused, match=r"no \.npz archive"):
+    with pytest.raises(CalibrationRefused, match=r"heights\.npy .*\.npz"):
         load_calibration(tmp_path / "heights.npy")
 
 
@@ -132,7 +132,7 @@ def test_a_pickle_is_never_opened(bench: TactileCalibration, tmp_path: Path) -> 
     path = tmp_path / "e.npz"
     save_calibration(bench, path)
     _rewrite(path, support=np.array([{"a": 1}], dtype=object))
-    with pytest.raises(CalibrationRefused, match="does not read"):
+    with pytest.raises(CalibrationRefused, match=r"\.npz"):
         load_calibration(path)
 
 

@@ -36,5 +36,5 @@ def test_what_is_fine_enough_is_left_alone() -> None:
 
 @pytest.mark.parametrize("longest", [0.0, -1.0, float("nan"), 1e-5])
 def test_edges_that_cannot_be_made_are_refused(longest: float) -> None:
-    with pytest.raises(WrongUse, match=r"edges of 0\.3 m cannot be divided.*give a length above"):
+    with pytest.raises(WrongUse, match=r"0\.3 m .* m.* m"):
         with_edges_below(BOX, longest)

@@ -139,7 +139,7 @@ def test_an_unknown_unit_is_refused_with_those_there_are(mug: Mesh, tmp_path: Pa
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_scale_that_makes_no_object_is_refused(mug: Mesh, tmp_path: Path, scale: float) -> None:
-    with pytest.raises(WrongUse, match="greater than 0"):
+    with pytest.raises(WrongUse, match="scale"):
         take_in(write(mug, tmp_path / "mug.stl"), "m", scale=scale)
 
 
@@ -147,7 +147,7 @@ def test_a_scale_that_makes_no_object_is_refused(mug: Mesh, tmp_path: Path, scal
 def test_an_absurd_size_is_refused_with_the_limits(
     mug: Mesh, tmp_path: Path, units: str, factor: float
 ) -> None:
-    with pytest.raises(MeshRefused, match="outside 5 mm to 2 m"):
+    with pytest.raises(MeshRefused, match="5 mm to 2 m"):
         take_in(write(mug, tmp_path / "mug.stl", factor), units)
 
 
@@ -158,5 +158,5 @@ def test_a_wall_without_thickness_is_refused(mug: Mesh, tmp_path: Path, wall: fl
 
 
 def test_a_wall_thicker_than_the_object_is_refused(mug: Mesh, tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="thinnest side"):
+    with pytest.raises(WrongUse, match=r"60 mm.* mm"):
         take_in(write(mug, tmp_path / "mug.stl"), "m", wall=0.06)

@@ -48,7 +48,7 @@ def test_an_obj_is_the_same_object_however_it_counts(numbered: str, tmp_path: Pa
 @pytest.mark.parametrize("face", ["f 0 1 4", "f 1 2 -5", "f 0 -1 -2", "f 1 2 3 5"])
 def test_an_obj_whose_faces_name_no_vertex_is_refused(face: str, tmp_path: Path) -> None:
     (tmp_path / "some.obj").write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n{face}\n")
-    with pytest.raises(MeshRefused, match=r"some\.obj has a face with vertex"):
+    with pytest.raises(MeshRefused, match=r"some\.obj .*vertex"):
         read_obj(tmp_path / "some.obj")
 
 

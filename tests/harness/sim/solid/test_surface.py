@@ -160,11 +160,11 @@ def test_the_same_seed_gives_the_same_samples() -> None:
 
 
 def test_an_object_smaller_than_its_samples_is_refused() -> None:
-    with pytest.raises(MeshRefused, match="check its units"):
+    with pytest.raises(MeshRefused, match=r"samples .* mm.* 32"):
         sample_surface(box(0.002, 0.002, 0.002), SPACING)
 
 
 def test_a_mesh_without_area_is_refused() -> None:
     flat = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]]))
-    with pytest.raises(MeshRefused, match="no surface"):
+    with pytest.raises(MeshRefused, match="surface"):
         sample_surface(flat, SPACING)

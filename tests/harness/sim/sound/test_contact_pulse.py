@@ -133,15 +133,15 @@ def test_modes_above_half_the_rate_and_impossible_blows_are_refused_or_named() -
     found = struck(frequencies, decays, np.ones((1, 2)), blow(), 0.1, RATE)
     assert found.left_out.tolist() == [False, True]
     assert found.sound.shape == (1, 4410)
-    with pytest.raises(WrongUse, match="ends within the contact"):
+    with pytest.raises(WrongUse, match=r" s .*contact .* s"):
         struck(frequencies, decays, np.ones((1, 2)), blow(NYLON), 1e-4, RATE)
-    with pytest.raises(WrongUse, match="are real"):
+    with pytest.raises(WrongUse, match="amplitudes"):
         struck(frequencies, decays, np.ones((1, 2)) * 1j, blow(), 0.1, RATE)
-    with pytest.raises(WrongUse, match="smaller radius"):
+    with pytest.raises(WrongUse, match=r"radius .* m .* m"):
         hertz_pulse(STEEL, 0.5, MATERIALS["steel"], curvature=-250.0)
-    with pytest.raises(WrongUse, match="speed is 0 m/s"):
+    with pytest.raises(WrongUse, match=r"speed .*0 m/s"):
         hertz_pulse(STEEL, 0.0, MATERIALS["steel"])
-    with pytest.raises(WrongUse, match="radius is nan m"):
+    with pytest.raises(WrongUse, match=r"radius .*nan m"):
         hertz_pulse(Hammer(math.nan, 1e9, 0.3, 0.1), 1.0, MATERIALS["steel"])
 
 

@@ -126,7 +126,7 @@ def test_a_strike_later_sounds_later_and_twice_as_hard_twice_as_loud() -> None:
 
 
 def test_what_does_not_belong_together_is_refused() -> None:
-    with pytest.raises(WrongUse, match="belong together"):
+    with pytest.raises(WrongUse, match=r"\(2,\)"):
         ring(one(100.0), np.ones(2), np.ones((1, 1)), blow(5), RATE)
     with pytest.raises(WrongUse, match="finite"):
         ring(one(100.0), one(np.nan), np.ones((1, 1)), blow(5), RATE)
@@ -155,7 +155,7 @@ def test_a_ball_is_as_loud_as_a_breathing_or_a_wobbling_sphere() -> None:
     exact *= 1.0 / (np.abs(slope) * (omega / SPEED_OF_SOUND) * 0.5)
     assert 0.4 < loud[quadrupole[0]] / exact < 2.5
     assert radiation(modes, 1.0) == pytest.approx(0.5 * loud)
-    with pytest.raises(WrongUse, match="distance above 0"):
+    with pytest.raises(WrongUse, match=r"\b0(\.0)? m"):
         radiation(modes, 0.0)
 
 
@@ -193,5 +193,5 @@ def test_a_microphone_is_flat_between_its_ends() -> None:
     tone = np.sin(2.0 * np.pi * 1000.0 * times)[None]
     heard = as_heard(tone, RATE, capsule)[0, 4800:]
     assert np.sqrt(np.mean(heard**2)) == pytest.approx(np.sqrt(0.5), rel=5e-3)
-    with pytest.raises(WrongUse, match="above 0"):
+    with pytest.raises(WrongUse, match=r"vent|above 0"):
         MicrophoneResponse(vent=0.0)

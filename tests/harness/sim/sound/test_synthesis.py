@@ -251,17 +251,17 @@ def test_sounds_share_no_memory() -> None:
 
 def test_what_does_not_belong_together_is_refused() -> None:
     f, d, g = drawn(1, 3)
-    with pytest.raises(WrongUse, match="belong together"):
+    with pytest.raises(WrongUse, match=r"dampings \(.*amplitudes \("):
         synthesize(f, d, g[:, :2], 1.0, RATE)
-    with pytest.raises(WrongUse, match="no sample"):
+    with pytest.raises(WrongUse, match=r"\b0(\.0)? s .*Hz"):
         synthesize(f, d, g, 0.0, RATE)
-    with pytest.raises(WrongUse, match="no sample"):
+    with pytest.raises(WrongUse, match=r"nan s .*Hz"):
         synthesize(f, d, g, float("nan"), RATE)
-    with pytest.raises(WrongUse, match="rate above 0"):
+    with pytest.raises(WrongUse, match=r"0.* samples per second"):
         synthesize(f, d, g, 1.0, 0.0)
     with pytest.raises(WrongUse, match="finite"):
         synthesize(f, d, g * np.nan, 1.0, RATE)
     with pytest.raises(WrongUse, match="rigid"):
         synthesize(f * 0.0, d, g, 1.0, RATE)
-    with pytest.raises(WrongUse, match="'fast'"):
+    with pytest.raises(WrongUse, match=r"'quick'.*'fast'"):
         synthesize(f, d, g, 1.0, RATE, "quick")  # type: ignore[arg-type]

@@ -31,7 +31,7 @@ def test_only_objects_of_type_model_are_the_object(tmp_path: Path, kind: str) ->
 
 def test_a_file_of_supports_alone_is_refused_by_their_type(tmp_path: Path) -> None:
     model = model_xml(f'<object id="1" type="support">{mesh_xml()}</object>', '<item objectid="1"/>')
-    with pytest.raises(MeshRefused, match="type 'support'"):
+    with pytest.raises(MeshRefused, match="'support'"):
         take_in(write_3mf(tmp_path / "box.3mf", model), None)
 
 
@@ -59,7 +59,7 @@ def test_what_the_build_does_not_place_is_no_object(tmp_path: Path) -> None:
     resources = f'<object id="1">{mesh_xml()}</object><object id="2">{mesh_xml()}</object>'
     path = write_3mf(tmp_path / "box.3mf", model_xml(resources, '<item objectid="2"/>'))
     assert take_in(path, None).report.bodies == 1
-    with pytest.raises(MeshRefused, match="builds nothing"):
+    with pytest.raises(MeshRefused, match="<build>"):
         take_in(write_3mf(tmp_path / "none.3mf", model_xml(resources, "")), None)
 
 
