@@ -96,11 +96,11 @@ COMMANDS = {
         "Say what an ObjectFile holds: modes, networks, sources, licence.",
     ),
     "object import": Command(
-        "harness.commands.object.published.importing:import_published",
+        "harness.commands.object.published:import_published",
         "Read a published ObjectFile (ObjectFolder 1.0 or 2.0) into a folder of ONNX networks.",
     ),
     "object render queries": Command(
-        "harness.commands.object.published.render:render",
+        "harness.commands.object.published:render_queries",
         "Answer ObjectFolder's own query files by an object: sounds, touches, pictures.",
     ),
     "object render audio": Command(

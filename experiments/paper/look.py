@@ -6,7 +6,7 @@ density, in a frame in which the ball around the object has the radius 1. Every 
 from where it may meet that ball to where it leaves it; no sample is left out, be it empty or hidden.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, astuple, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -34,8 +34,7 @@ from harness.basics.errors import DataRefused
 from harness.basics.mesh import Mesh
 from harness.basics.store import digest
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.published.camera import FOCAL, SIZE
-from harness.objectfile.published.look import OsfNetwork, osf_tensors
+from harness.objectfile.published.look import FOCAL, SIZE, OsfNetwork, RawField, osf_tensors
 from harness.objectfile.published.volume_render import render_rays, stretched_sigmoid
 from harness.objectfile.runtime import Network
 from harness.objectfile.vision.graph import vision_graph
@@ -161,9 +160,6 @@ def _seed(of: ObjectFile) -> int:
 FIELD_FILE = "vision_field.onnx"
 REACH = 4.0
 """Radii of the ball, that samples lie within."""
-
-RawField = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
-"""``(n, 3)`` points and views and a ``(3,)`` light to ``(n, 4)`` raw red, green, blue and density."""
 
 
 @dataclass(frozen=True, eq=False)

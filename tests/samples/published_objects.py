@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.objectfile.entries import Source
-from harness.objectfile.published.entries import Bounds
-from harness.objectfile.published.folder import PublishedObject
+from harness.objectfile.published.entries import Bounds, PublishedObject
 from tests.samples import published_trees
 
 AUDIO_BOUNDS: Bounds = (2.0, 21.0)

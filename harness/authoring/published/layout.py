@@ -17,6 +17,15 @@ _PREFIX = "module."
 _UNUSED = "views_linears."
 """Layers that the published networks of sound and touch are saved with and never use."""
 
+_FOREIGN = "it is no ObjectFile as ObjectFolder publishes them"
+
+_MARKS = {
+    "VisionNet": ("cfg", "network_fn_state_dict"),
+    "AudioNet": ("frequencies", "voxel_vertex"),
+    "TouchNet": ("xyz_min", "model_state_dict"),
+}
+"""The key that tells version 2.0, else the key that tells version 1.0, by the networks of a file."""
+
 
 @dataclass(frozen=True, eq=False)
 class FileTable:
@@ -29,73 +38,68 @@ class FileTable:
         """Return a table within; ``DataRefused`` where there is none."""
         found = self.values.get(key)
         if not isinstance(found, Mapping):
-            raise DataRefused(
-                f"{self.name} has no table {key!r}; it is no ObjectFile as ObjectFolder publishes them"
-            )
+            raise DataRefused(f"{self.name} has no table {key!r}; {_FOREIGN}")
         return FileTable(f"{self.name}/{key}", found)
 
-    def array(self, key: str, shape: tuple[int | None, ...]) -> FloatArray:
-        """Return finite numbers of a shape, None for any size from 1 up; ``DataRefused`` for others."""
-        value = self.values.get(key)
-        if not isinstance(value, np.ndarray | int | float | list):
-            raise DataRefused(
-                f"{self.name} has no numbers {key!r}; it is no ObjectFile as ObjectFolder publishes them"
-            )
-        return checked(value, shape, f"{self.name}/{key}")
+    def array(self, key: str, shape: tuple[int | None, ...] | None = None) -> FloatArray:
+        """Return finite numbers of a shape; ``DataRefused`` for others.
 
-    def numbers(self, key: str, count: int) -> FloatArray:
+        Args:
+            key: name of the entry.
+            shape: sizes, None for any size from 1 up; None for any shape.
+        """
+        if key not in self.values:
+            raise DataRefused(f"{self.name} has no {key!r}; {_FOREIGN}")
+        return checked(self.values[key], shape, f"{self.name}/{key}")
+
+    def numbers(self, key: str, count: int = 1) -> FloatArray:
         """Return ``(count,)`` float64 from one number for all, or from as many in any shape."""
-        value = self.values.get(key)
-        if not isinstance(value, np.ndarray | int | float | list) or isinstance(value, bool):
-            raise DataRefused(
-                f"{self.name} has no number {key!r}; it is no ObjectFile as ObjectFolder publishes them"
-            )
-        flat = checked(np.asarray(value).ravel(), (None,), f"{self.name}/{key}")
+        flat = self.array(key).ravel()
         if flat.size not in (1, count):
             raise DataRefused(f"{self.name}/{key} has {flat.size} numbers, where there is 1, or {count}")
         return np.array(np.broadcast_to(flat, (count,)))
 
-    def number(self, key: str) -> float:
-        """Return one finite number."""
-        return float(self.numbers(key, 1)[0])
+    def wholes(self, key: str, count: int, most: int, least: int = 1) -> tuple[int, ...]:
+        """Return ``count`` whole numbers within limits; ``DataRefused`` for others."""
+        numbers = self.numbers(key, count).tolist()
+        if not all(number == round(number) and least <= number <= most for number in numbers):
+            raise DataRefused(f"{self.name}/{key} is {numbers}, not whole numbers from {least} to {most}")
+        return tuple(map(int, numbers))
 
     def whole(self, key: str, most: int, least: int = 1) -> int:
-        """Return a whole number within limits; ``DataRefused`` for others."""
-        number = self.number(key)
-        if number != round(number) or not least <= number <= most:
-            raise DataRefused(f"{self.name}/{key} is {number:g}, not a whole number from {least} to {most}")
-        return int(number)
-
-    def sizes(self, key: str, most: int) -> tuple[int, int, int]:
-        """Return whole numbers along x, y and z, from 1; ``DataRefused`` for others."""
-        x, y, z = self.array(key, (3,)).tolist()
-        if not all(size == round(size) and 1 <= size <= most for size in (x, y, z)):
-            raise DataRefused(f"{self.name}/{key} is {[x, y, z]}, not three whole numbers from 1 to {most}")
-        return int(x), int(y), int(z)
+        """Return one whole number within limits."""
+        return self.wholes(key, 1, most, least)[0]
 
     def flag(self, key: str) -> bool:
         """Return true or false, which is what a missing one is."""
-        value = self.values.get(key, False)
-        if not isinstance(value, bool | int):
-            raise DataRefused(f"{self.name}/{key} is {value!r}, where true or false belongs")
-        return bool(value)
+        return key in self.values and self.whole(key, 1, least=0) == 1
+
+    def box(self) -> tuple[FloatArray, FloatArray]:
+        """Return the ``(3,)`` least and greatest corner of the box that a network was trained in."""
+        low, high = (self.numbers(key, 3) for key in ("xyz_min", "xyz_max"))
+        if not (high > low).all():
+            raise DataRefused(f"{self.name}: a box from {low} to {high} has no extent along some axis")
+        return low, high
 
 
 def checked(
-    value: Any, shape: tuple[int | None, ...], name: str, kind: type[np.floating[Any]] = np.float64
+    value: Any,
+    shape: tuple[int | None, ...] | None,
+    name: str,
+    kind: type[np.floating[Any]] = np.float64,
 ) -> FloatArray:
     """Convert to finite numbers of a shape; ``DataRefused`` for other shapes, or for text."""
     try:
         array = np.asarray(value)
     except ValueError as error:
         raise DataRefused(f"{name} is no array") from error
-    fits = len(array.shape) == len(shape) and all(
-        size >= 1 if wanted is None else size == wanted
-        for size, wanted in zip(array.shape, shape, strict=True)
+    wanted = array.shape if shape is None else shape
+    fits = len(array.shape) == len(wanted) and all(
+        found >= 1 if size is None else found == size for found, size in zip(array.shape, wanted, strict=True)
     )
     if array.dtype.kind not in "fiub" or not fits:
-        wanted = " x ".join("n" if size is None else str(size) for size in shape) or "one number"
-        raise DataRefused(f"{name} holds {array.dtype} {array.shape}, where {wanted} belongs")
+        sizes = " x ".join("n" if size is None else str(size) for size in wanted) or "one number"
+        raise DataRefused(f"{name} holds {array.dtype} {array.shape}, where {sizes} belongs")
     with np.errstate(over="ignore", under="ignore"):
         numbers: FloatArray = array.astype(kind)
     if not np.isfinite(numbers).all():
@@ -112,25 +116,20 @@ def format_of(tree: Any, name: str) -> Format:
     Raises:
         DataRefused: neither.
     """
-    senses = [
-        key for key in ("VisionNet", "AudioNet", "TouchNet") if isinstance(tree, Mapping) and key in tree
-    ]
+    table = tree if isinstance(tree, Mapping) else {}
+    senses = [key for key in _MARKS if key in table]
     if not senses:
-        held = sorted(map(str, tree))[:5] if isinstance(tree, Mapping) else type(tree).__name__
+        names = sorted(map(str, table))[:5] or type(tree).__name__
         raise DataRefused(
-            f"{name} holds {held} and neither VisionNet, AudioNet nor TouchNet: it is no ObjectFile of "
+            f"{name} holds {names} and neither VisionNet, AudioNet nor TouchNet: it is no ObjectFile of "
             "ObjectFolder"
         )
-    marks = (("VisionNet", "cfg", "network_fn_state_dict"), ("AudioNet", "frequencies", "voxel_vertex"),
-             ("TouchNet", "xyz_min", None))  # fmt: skip
     found: set[Format] = set()
-    for sense, second, first in marks:
-        table = tree.get(sense)
-        if isinstance(table, Mapping):
-            if second in table:
-                found.add("ObjectFolder 2.0")
-            elif first is None or first in table:
-                found.add("ObjectFolder 1.0")
+    for sense in senses:
+        second, first = _MARKS[sense]
+        held = table[sense] if isinstance(table[sense], Mapping) else {}
+        if second in held or first in held:
+            found.add("ObjectFolder 2.0" if second in held else "ObjectFolder 1.0")
     if len(found) != 1:
         raise DataRefused(
             f"{name} has {', '.join(senses)} of {' and '.join(sorted(found)) or 'no known layout'}; an "
@@ -154,11 +153,10 @@ class State:
         The prefix goes where every name has it, and then wherever it stands, as in the published programs.
         """
         table = part.part(key)
-        names = [str(name) for name in table.values]
-        prefixed = bool(names) and all(name.startswith(_PREFIX) for name in names)
-        values = {name.replace(_PREFIX, "") if prefixed else name: value
-                  for name, value in zip(names, table.values.values(), strict=True)}  # fmt: skip
-        if len(values) != len(names):
+        prefixed = all(str(name).startswith(_PREFIX) for name in table.values)
+        values = {str(name).replace(_PREFIX, "") if prefixed else str(name): value
+                  for name, value in table.values.items()}  # fmt: skip
+        if len(values) != len(table.values):
             raise DataRefused(f"{table.name} has two weights of one name behind {_PREFIX!r}")
         return cls(table.name, values)
 

@@ -177,7 +177,7 @@ class KiloOsf(nn.Module):
         self,
         lows: FloatArray,
         cell: FloatArray,
-        widths: tuple[int, int, int, int],
+        widths: Sequence[int],
         octaves: tuple[int, int],
     ) -> None:
         super().__init__()

@@ -1,11 +1,9 @@
 """``touchstone object``: what an ObjectFile holds, and whether it is what it says."""
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.commands import options
-from harness.commands.object.published.info import published_lines
 from harness.commands.output import ANSWERS, emit
 
 if TYPE_CHECKING:
@@ -20,25 +18,17 @@ def info(folder: options.ObjectFolder, json: options.Json = False) -> int:
 
     Try: touchstone object info objects/mug
     """
-    description, lines = _described(folder)
-    if json:
-        emit({"folder": str(folder), **description.model_dump(mode="json", by_alias=True)})
-    else:
-        for line in lines:
-            ANSWERS.print(line, markup=False)
-    return 0
-
-
-def _described(folder: Path) -> "tuple[Description | PublishedDescription, list[str]]":
-    """What an ``object.json`` of either kind says, and the lines for people."""
     from harness.objectfile.file import ObjectFile
-    from harness.objectfile.published.folder import PublishedObject, holds_published
+    from harness.objectfile.published.entries import open_either
 
-    if holds_published(folder):
-        published = PublishedObject.open(folder).description
-        return published, published_lines(published)
-    description = ObjectFile.open(folder).description
-    return description, _lines(description)
+    of = open_either(folder)
+    if json:
+        emit({"folder": str(folder), **of.description.model_dump(mode="json", by_alias=True)})
+        return 0
+    lines = _lines(of.description) if isinstance(of, ObjectFile) else published_lines(of.description)
+    for line in lines:
+        ANSWERS.print(line, markup=False)
+    return 0
 
 
 def verify(folder: options.ObjectFolder, json: options.Json = False) -> int:
@@ -50,18 +40,11 @@ def verify(folder: options.ObjectFolder, json: options.Json = False) -> int:
 
     Try: touchstone object verify objects/mug
     """
-    from harness.objectfile.file import ObjectFile
-    from harness.objectfile.published.folder import PublishedObject, holds_published
+    from harness.objectfile.published.entries import open_either
     from harness.objectfile.verify.verify import verify as look
-    from harness.objectfile.verify.verify import verify_published
 
-    of: ObjectFile | PublishedObject
-    if holds_published(folder):
-        of = PublishedObject.open(folder)
-        checks = verify_published(of)
-    else:
-        of = ObjectFile.open(folder)
-        checks = look(of)
+    of = open_either(folder)
+    checks = look(of)
     failed = [check for check in checks if not check.passed]
     if json:
         listed = [{"check": c.name, "passed": c.passed, "said": c.said} for c in checks]
@@ -72,6 +55,29 @@ def verify(folder: options.ObjectFolder, json: options.Json = False) -> int:
     count = f"{len(failed)} of {len(checks)} checks failed" if failed else f"all {len(checks)} checks hold"
     ANSWERS.print(f"{of.description.name}: {count}", markup=False)
     return 1 if failed else 0
+
+
+def published_lines(description: "PublishedDescription") -> list[str]:
+    """Describe imported networks: the source, the tables of each sense, and what the file did not hold."""
+    source = description.provenance.sources[0]
+    lines = [
+        f"{description.name}, imported from {source.origin} ({description.format})",
+        f"  sha256    {source.sha256}",
+        f"  licence   {description.provenance.licence}",
+    ]
+    for sense in ("audio_gains", "audio_spectrum", "touch_depth", "touch_colours", "vision"):
+        fields = []
+        for key, value in getattr(description, sense) or ():
+            if isinstance(value, tuple) and len(value) > 3:
+                fields.append(f"{len(value)} {key} from {min(value):.5g} to {max(value):.5g}")
+            elif isinstance(value, tuple | float | int | str):
+                fields.append(f"{key} {value}")
+        if fields:
+            lines.append(f"  {sense}: {'; '.join(fields)}")
+    dropped = sum(description.dropped.values())
+    if dropped:
+        lines.append(f"  dropped   {dropped} weights in {len(description.dropped)} layers that nothing uses")
+    return [*lines, *(f"  lacks     {sentence}" for sentence in description.missing)]
 
 
 def _lines(description: "Description") -> list[str]:

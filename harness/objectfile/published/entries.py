@@ -1,15 +1,23 @@
-"""The tables of ``object.json`` for networks imported from a published file.
+"""A folder of networks imported from a published file: the tables of its ``object.json``, and its files.
 
 Published networks predict other quantities than a built ObjectFile's, in frames of their own: gains of modes
 in a unit that is nowhere stated, the distance from a camera to a gel, raw colour and density in a normalised
 cube. Each table names its quantity; what a file does not hold is null and listed under ``missing``.
 """
 
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from harness.basics.errors import WrongUse
+from harness.objectfile.description import is_published, model_from, read_tree
 from harness.objectfile.entries import Entry, FileEntry, NetworkEntry, Provenance
+from harness.objectfile.file import ObjectFile, read_named
+from harness.objectfile.runtime import Network
+from harness.objectfile.self_test import open_network
+from harness.objects.builtin import DESCRIPTION
 
 Positive = Annotated[float, Field(gt=0.0)]
 Size = Annotated[int, Field(ge=1)]
@@ -164,14 +172,51 @@ class PublishedDescription(Entry):
             "vision": vision,
         }
         found = {name: entry.network for name, entry in every.items() if entry is not None}
-        if vision is not None and vision.fine is not None:
-            found["vision fine"] = vision.fine
-        return found
+        return found if vision is None or vision.fine is None else {**found, "vision fine": vision.fine}
 
     @property
     def files(self) -> tuple[FileEntry, ...]:
         """Every file that the folder must hold, each once."""
-        voxels = () if self.audio_spectrum is None else (self.audio_spectrum.voxels,)
         cells = None if self.vision is None else self.vision.cells
-        others = () if cells is None else (cells.networks, cells.occupancy)
-        return tuple(entry for entry in (*self.networks.values(), *voxels, *others) if entry is not None)
+        voxels = None if self.audio_spectrum is None else self.audio_spectrum.voxels
+        others = (voxels, None, None) if cells is None else (voxels, cells.networks, cells.occupancy)
+        return tuple(entry for entry in (*self.networks.values(), *others) if entry is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class PublishedObject:
+    """An object whose networks were published by others."""
+
+    folder: Path  #: where its files are.
+    description: PublishedDescription  #: contents of its ``object.json``.
+
+    @classmethod
+    def open(cls, folder: Path) -> "PublishedObject":
+        """Read ``object.json``; the files are read when they are used.
+
+        Raises:
+            WrongUse: there is none, or it is of an object built from its mesh.
+            DataRefused: it is damaged.
+        """
+        path = folder / DESCRIPTION
+        tree = read_tree(path)
+        if not is_published(tree):
+            raise WrongUse(
+                f"{folder} was built from a mesh and not imported from a published file; open it as an "
+                "ObjectFile"
+            )
+        return cls(folder, model_from(tree, PublishedDescription, str(path)))
+
+    def read(self, entry: FileEntry) -> bytes:
+        """Read a file; ``DataRefused`` if it is missing, leads out of the folder, or its hash differs."""
+        return read_named(self.folder, entry)
+
+    def network(self, entry: NetworkEntry) -> Network:
+        """Open a network; ``DataRefused`` if it is not the one described, or answers otherwise."""
+        return open_network(self.read(entry), entry)
+
+
+def open_either(folder: Path) -> ObjectFile | PublishedObject:
+    """Open a folder of either kind; errors as of ``ObjectFile.open`` and ``PublishedObject.open``."""
+    is_imported = is_published(read_tree(folder / DESCRIPTION))
+    return PublishedObject.open(folder) if is_imported else ObjectFile.open(folder)

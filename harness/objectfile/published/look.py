@@ -1,29 +1,112 @@
-"""Pictures of an imported look: raw colour and density from one network (OSF), or one a cell (KiloOSF)."""
+"""Pictures of an imported look: cameras, and raw colour and density of one network (OSF) or one a cell.
 
+A camera looks at the origin of the vision frame, z is up in the picture as far as the view allows. In the
+camera x is right, y up and the view is along -z; a ray's direction has the length at which its depth along
+the axis is 1.
+"""
+
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
 import numpy as np
 
-from harness.basics.arrays import BoolArray, ByteArray, FloatArray, IntArray
-from harness.basics.errors import DataRefused
+from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.basics.errors import DataRefused, OutOfDomain
 from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.npy_file import npy_array
-from harness.objectfile.published.camera import PublishedView
-from harness.objectfile.published.entries import PublishedCellsEntry, PublishedVisionEntry
-from harness.objectfile.published.folder import PublishedObject
+from harness.objectfile.published.entries import PublishedCellsEntry, PublishedObject, PublishedVisionEntry
 from harness.objectfile.published.query import query
 from harness.objectfile.published.volume_render import render_rays, stretched_sigmoid
 from harness.objectfile.runtime import Network
-from harness.objectfile.self_test import open_network
 from harness.objectfile.vision_tensors import graph_input
+from harness.picture.pinhole import unit_vector
+
+COMPAT_DISTANCE = 2.5
+"""Distance from the origin of every camera that the published networks were trained by."""
+
+FOCAL = 355.5555419921875
+"""Pixels, of a picture of 256."""
+
+SIZE = 256
+
+_OFF = 1e-3
+"""Relative error of a distance or of the length of a direction; query files are rounded to a few digits."""
 
 _BLOCKS = 256
 """Blocks in one run of cells: their weights are gathered for it, 20 MB of them."""
 
 _RIM = 1e-3
-"""Within the cube's faces, in which nothing is taken to be."""
+"""Distance from the cube's faces within which nothing is taken to be."""
+
+
+@dataclass(frozen=True, eq=False)
+class PublishedView:
+    """A camera and a light."""
+
+    eye: FloatArray  #: ``(3,)``, in the vision frame.
+    rotation: FloatArray  #: ``(3, 3)``: vision from camera.
+    light: FloatArray  #: ``(3,)`` as the network takes it.
+
+    def directions(self, size: int, offset: float) -> FloatArray:
+        """Compute the ``(size * size, 3)`` directions of the rays, row by row.
+
+        Args:
+            size: pixels a side.
+            offset: pixels from a pixel's upper left corner, right and down.
+        """
+        x, y = np.meshgrid(np.arange(size) + offset, np.arange(size) + offset)
+        scale = SIZE / (FOCAL * size)
+        in_camera = np.stack(
+            [(x - 0.5 * size) * scale, (0.5 * size - y) * scale, np.full_like(x, -1.0)], axis=-1
+        )
+        directions: FloatArray = in_camera.reshape(-1, 3) @ self.rotation.T
+        return directions
+
+
+def views_of(rows: FloatArray, reach: float, compat: bool) -> list[PublishedView]:
+    """Return the views of a query file.
+
+    Args:
+        rows: ``(n, 6)``: camera and light.
+        reach: distance of the object from the origin; a camera must be outside of it.
+        compat: whether the camera must be where the published program assumes it, and the light have the
+            length that it was trained with; else any distance and length will do.
+
+    Raises:
+        OutOfDomain: naming the row.
+    """
+    views = []
+    for number, (eye, light) in enumerate(zip(rows[:, :3], rows[:, 3:], strict=True)):
+        distance, length = float(np.linalg.norm(eye)), float(np.linalg.norm(light))
+        if compat and abs(distance - COMPAT_DISTANCE) > _OFF * COMPAT_DISTANCE:
+            raise OutOfDomain(
+                f"camera {number} is {distance:.6g} from the origin, and the published program takes every "
+                f"one to be at {COMPAT_DISTANCE}: it would aim elsewhere; move it, or leave "
+                "--objectfolder-compat out"
+            )
+        if not distance > reach:
+            raise OutOfDomain(
+                f"camera {number} is {distance:.6g} from the origin, within the object's {reach:g}; move it "
+                "out"
+            )
+        towards = unit_vector(light, f"light {number}")
+        if compat and abs(length - 1.0) > _OFF:
+            raise OutOfDomain(
+                f"light {number} has the length {length:.6g}, and the network was trained with 1; divide it "
+                "by that"
+            )
+        # First about x by the polar angle, then about z by the azimuth.
+        cosine = float(eye[2]) / (COMPAT_DISTANCE if compat else distance)
+        polar, azimuth = math.acos(max(-1.0, min(1.0, cosine))), math.atan2(float(eye[0]), -float(eye[1]))
+        c, s = math.cos(polar), math.sin(polar)
+        about_x = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+        c, s = math.cos(azimuth), math.sin(azimuth)
+        about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        views.append(PublishedView(eye, about_z @ about_x, light if compat else towards))
+    return views
 
 
 def osf_tensors(reach: float) -> tuple[tuple[Input, ...], tuple[Tensor, ...]]:
@@ -50,6 +133,11 @@ def raw_look_tensors(rows: tuple[int | Literal["n"], ...]) -> tuple[Tensor, ...]
     )
 
 
+RawField = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+"""``(n, 3)`` points in the vision frame, ``(n, 3)`` unit views from the camera and the ``(3,)`` unit
+direction of the light, to ``(n, 4)`` raw red, green, blue and density; zeros where nothing can be."""
+
+
 @dataclass(frozen=True, eq=False)
 class OsfNetwork:
     """One network for all points."""
@@ -57,16 +145,7 @@ class OsfNetwork:
     network: Network
 
     def raw(self, points: FloatArray, views: FloatArray, light: FloatArray) -> FloatArray:
-        """Compute raw red, green, blue and density.
-
-        Args:
-            points: ``(n, 3)`` in the vision frame.
-            views: ``(n, 3)`` unit directions from the camera.
-            light: ``(3,)`` unit direction.
-
-        Returns:
-            ``(n, 4)``; zeros where nothing can be, as in the published program.
-        """
+        """Compute raw colour and density; see ``RawField``."""
         lights = np.broadcast_to(light, points.shape)
         return _joined(query(self.network, {"points": points, "views": views, "light": lights}))
 
@@ -80,8 +159,28 @@ class CellNetworks:
     networks: IntArray  #: ``(cells,)`` number of each cell's network, -1 for none.
     occupied: BoolArray | None  #: ``(voxels,)``; None if all of the cube counts as occupied.
 
+    @classmethod
+    def open(cls, of: PublishedObject, cells: PublishedCellsEntry, network: Network) -> "CellNetworks":
+        """Read the network of each cell and the occupancy; ``DataRefused`` for damaged files."""
+        count, file = math.prod(cells.cells), cells.networks
+        networks = npy_array(of.read(file), file.file, "<i4", (count,), f"the networks of {count} cells")
+        last = (network.inputs[0].domain.high or (0.0,))[0]
+        if networks.min() < -1 or networks.max() > last:
+            raise DataRefused(
+                f"{file.file} names network {networks.max()} of {last + 1:g} from 0 on; import it again"
+            )
+        occupied = None
+        if cells.occupancy is not None and cells.voxels is not None:
+            data, voxels = of.read(cells.occupancy), math.prod(cells.voxels)
+            if len(data) != -(-voxels // 8):
+                raise DataRefused(
+                    f"{cells.occupancy.file} has {len(data)} bytes for {voxels} voxels; import it again"
+                )
+            occupied = np.unpackbits(np.frombuffer(data, np.uint8), count=voxels).astype(np.bool_)
+        return cls(cells, network, networks.astype(np.int64), occupied)
+
     def raw(self, points: FloatArray, views: FloatArray, light: FloatArray) -> FloatArray:
-        """Compute raw red, green, blue and density, as ``OsfNetwork.raw``."""
+        """Compute raw colour and density; see ``RawField``."""
         result = np.zeros((len(points), 4))
         which = self.network_at(points)
         inside = np.flatnonzero(which >= 0)
@@ -89,16 +188,14 @@ class CellNetworks:
         rows, samples = blocks(which[order], self.entry.block)
         if not len(rows):
             return result
-        chosen = order[
-            samples
-        ]  # the places behind a block's samples repeat another, whose answer is left out
+        # The places behind a block's samples repeat another, whose answer is left out.
+        chosen, used = order[samples], samples >= 0
         inputs = {
             "network": rows[:, None],
             "points": points[chosen],
             "views": views[chosen],
             "light": np.broadcast_to(light, (len(rows), 3)),
         }
-        used = samples >= 0
         result[chosen[used]] = _joined(query(self.network, inputs, _BLOCKS))[used]
         return result
 
@@ -134,20 +231,16 @@ def blocks(networks: IntArray, size: int) -> tuple[IntArray, IntArray]:
     return np.repeat(names, needed).astype(np.int64), samples
 
 
-@dataclass(frozen=True, eq=False)
-class PublishedPicture:
-    """A picture, before it is rounded."""
+def _flat_index(fraction: FloatArray, sizes: tuple[int, int, int]) -> IntArray:
+    """Return the index, x slowest, of the box that contains each of ``(n, 3)`` fractions of the cube."""
+    most = np.array(sizes)
+    i, j, k = np.clip((fraction * most).astype(np.int64), 0, most - 1).T
+    index: IntArray = (i * sizes[1] + j) * sizes[2] + k
+    return index
 
-    colour: FloatArray  #: ``(size, size, 3)``, of which 0 is black and 1 white; it may lie beyond.
-    cover: FloatArray  #: ``(size, size)`` share of each pixel that is covered.
 
-    def rounded(self) -> ByteArray:
-        """``(size, size, 3)`` to the nearest of 256 greys."""
-        return np.rint(255.0 * np.clip(self.colour, 0.0, 1.0)).astype(np.uint8)
-
-    def truncated(self) -> ByteArray:
-        """The same as the published programs write it: to the grey below."""
-        return (255.0 * np.clip(self.colour, 0.0, 1.0)).astype(np.uint8)
+def _joined(outputs: dict[str, FloatArray]) -> FloatArray:
+    return np.concatenate([outputs["colour_raw"], outputs["density_raw"]], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +248,20 @@ class PublishedLook:
     """The networks of an imported look."""
 
     entry: PublishedVisionEntry  #: description of the look, with how rays are sampled.
-    coarse: OsfNetwork | CellNetworks  #: the only network, or that of the first samples.
-    fine: OsfNetwork | None = None  #: network of all samples; None if there are no further ones.
+    coarse: RawField  #: the only network, or that of the first samples.
+    fine: RawField | None = None  #: network of all samples; None if there are no further ones.
 
-    def picture(self, view: PublishedView, size: int, offset: float) -> PublishedPicture:
-        """Render a view.
+    @classmethod
+    def open(cls, of: PublishedObject, entry: PublishedVisionEntry) -> "PublishedLook":
+        """Open the networks; ``DataRefused`` if a file is not the one described."""
+        network = of.network(entry.network)
+        if entry.cells is not None:
+            return cls(entry, CellNetworks.open(of, entry.cells, network).raw)
+        fine = None if entry.fine is None else OsfNetwork(of.network(entry.fine)).raw
+        return cls(entry, OsfNetwork(network).raw, fine)
+
+    def picture(self, view: PublishedView, size: int, offset: float) -> FloatArray:
+        """Render ``(size, size, 3)`` colours, of which 0 is black and 1 white; some may be outside of that.
 
         Args:
             view: camera and light.
@@ -169,9 +271,9 @@ class PublishedLook:
         entry = self.entry
 
         def shown(
-            network: OsfNetwork | CellNetworks, points: FloatArray, views: FloatArray
+            raw_field: RawField, points: FloatArray, views: FloatArray
         ) -> tuple[FloatArray, FloatArray]:
-            raw = network.raw(points, views, view.light)
+            raw = raw_field(points, views, view.light)
             if entry.colour == "clipped":
                 return raw[:, 3], 1.2 * (np.clip(raw[:, :3], 0.0, 1.0) - 0.5) + 0.5
             return raw[:, 3], stretched_sigmoid(raw[:, :3])
@@ -186,49 +288,4 @@ class PublishedLook:
         )
         if entry.white:
             colour = colour + (1.0 - cover)[:, None]
-        return PublishedPicture(colour.reshape(size, size, 3), cover.reshape(size, size))
-
-
-def open_look(of: PublishedObject, entry: PublishedVisionEntry) -> PublishedLook:
-    """Open the look of an imported object.
-
-    Raises:
-        DataRefused: a file of it is not the one described.
-    """
-    network = open_network(of.read(entry.network), entry.network)
-    if entry.cells is not None:
-        return PublishedLook(entry, _open_cells(of, entry.cells, network))
-    fine = None if entry.fine is None else OsfNetwork(open_network(of.read(entry.fine), entry.fine))
-    return PublishedLook(entry, OsfNetwork(network), fine)
-
-
-def _open_cells(of: PublishedObject, cells: PublishedCellsEntry, network: Network) -> CellNetworks:
-    count = int(np.prod(cells.cells))
-    file = cells.networks
-    networks = npy_array(of.read(file), file.file, "<i4", (count,), f"the networks of {count} cells")
-    most = (network.inputs[0].domain.high or (0.0,))[0]
-    if networks.min() < -1 or networks.max() > most:
-        raise DataRefused(
-            f"{file.file} names networks to {networks.max()} where there are {most + 1:g}; import it again"
-        )
-    occupied = None
-    if cells.occupancy is not None and cells.voxels is not None:
-        data, voxels = of.read(cells.occupancy), int(np.prod(cells.voxels))
-        if len(data) != -(-voxels // 8):
-            raise DataRefused(
-                f"{cells.occupancy.file} has {len(data)} bytes for {voxels} voxels; import it again"
-            )
-        occupied = np.unpackbits(np.frombuffer(data, np.uint8), count=voxels).astype(np.bool_)
-    return CellNetworks(cells, network, networks.astype(np.int64), occupied)
-
-
-def _flat_index(fraction: FloatArray, sizes: tuple[int, int, int]) -> IntArray:
-    """Index, x slowest, of the box that contains each of ``(n, 3)`` fractions of the cube."""
-    most = np.array(sizes)
-    i, j, k = np.clip((fraction * most).astype(np.int64), 0, most - 1).T
-    index: IntArray = (i * sizes[1] + j) * sizes[2] + k
-    return index
-
-
-def _joined(outputs: dict[str, FloatArray]) -> FloatArray:
-    return np.concatenate([outputs["colour_raw"], outputs["density_raw"]], axis=-1)
+        return colour.reshape(size, size, 3)

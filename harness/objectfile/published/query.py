@@ -1,35 +1,22 @@
-"""Read ObjectFolder's own query files, and query the networks of an imported ObjectFile.
-
-The files are rows of numbers in ``.npy``, checked before anything is computed. ``vision``: camera and light,
-``(n, 6)`` in the vision frame. ``audio``: vertices ``(n, 3)`` in metres and forces ``(n, 3)``. ``touch``:
-vertices ``(n, 3)`` in metres, and the gel's tilt and azimuth in rad and depth in metres, ``(n, 3)``.
-"""
+"""Query the networks of an imported object, and refuse what they were not trained at."""
 
 from collections.abc import Mapping
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from harness.basics.arrays import AnyArray, FloatArray, read_only
-from harness.basics.errors import DataRefused, OutOfDomain
-from harness.basics.files.foreign_file import require_readable
-from harness.basics.files.named_file import require_file
-from harness.basics.npz_file import read_array
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.objectfile.runtime import Network
 
-MOST_ROWS = 1000
-"""Of one file: a thousand compatible sounds are 1 GB while they are computed."""
-
-_MOST_BYTES = 64 * 2**20
-
-_AT_ONCE = 16384
+_BATCH = 16384
 """Rows in one run of a network."""
 
 _ROUNDING = 1e-6
-"""Slack relative to an extent: bounds of a published file are often float32."""
+"""Slack relative to a range: the bounds of a published file are often float32."""
 
 
-def query(network: Network, inputs: Mapping[str, AnyArray], rows: int = _AT_ONCE) -> dict[str, FloatArray]:
+def query(network: Network, inputs: Mapping[str, AnyArray], rows: int = _BATCH) -> dict[str, FloatArray]:
     """Compute the outputs of a network.
 
     Args:
@@ -59,59 +46,65 @@ def query(network: Network, inputs: Mapping[str, AnyArray], rows: int = _AT_ONCE
     return outputs
 
 
-def require_in_box(points: FloatArray, low: FloatArray, high: FloatArray, what: str) -> None:
-    """Refuse points that a network was not trained at.
+def require_trained(values: FloatArray, low: Any, high: Any, what: str, unit: str) -> None:
+    """Refuse queries outside of the range that a network was trained in.
 
     Args:
-        points: ``(n, 3)`` m.
-        low: ``(3,)`` m, least corner of the box.
-        high: ``(3,)`` m, greatest corner of the box.
-        what: noun for a point in the message.
+        values: ``(n, k)`` numbers of the queries.
+        low: least numbers, ``(k,)`` or one for all.
+        high: greatest numbers, ``(k,)`` or one for all.
+        what: noun for a query in the message.
+        unit: unit of the numbers.
 
     Raises:
-        OutOfDomain: naming the first point outside.
+        OutOfDomain: naming the first query outside.
     """
+    low, high = (np.broadcast_to(np.asarray(bound, np.float64), values.shape[1:]) for bound in (low, high))
     slack = _ROUNDING * (high - low)
-    outside = np.flatnonzero(((points < low - slack) | (points > high + slack)).any(axis=1))
+    outside = np.flatnonzero(((values < low - slack) | (values > high + slack)).any(axis=1))
     if len(outside):
-        x, y, z = points[outside[0]]
-        corners = ["(" + ", ".join(f"{value:.6g}" for value in corner) + ")" for corner in (low, high)]
+        number, least, greatest = (
+            ", ".join(f"{value:.6g}" for value in row) for row in (values[outside[0]], low, high)
+        )
         raise OutOfDomain(
-            f"{what} {outside[0]} at ({x:.6g}, {y:.6g}, {z:.6g}) m is outside of the box from {corners[0]} "
-            f"to {corners[1]} m that the network was trained in ({len(outside)} of {len(points)} are); give "
-            "vertices of the object's own mesh"
+            f"{what} {outside[0]} at ({number}) {unit} is outside of the box from ({least}) to ({greatest}) "
+            f"{unit} that the network was trained in ({len(outside)} of {len(values)} are); move it inside"
         )
 
 
-def read_rows(path: Path, columns: int, what: str) -> FloatArray:
-    """``(n, columns)`` float64 of a query file; nothing in it is run.
+def coordinate_bounds(
+    given: tuple[float, float] | None,
+    queried: FloatArray,
+    *,
+    of_query: bool,
+    option: str,
+    what: str,
+    unit: str,
+) -> tuple[float, float]:
+    """Return the least and greatest coordinate that a network of version 1.0 normalises its queries by.
+
+    The files of version 1.0 hold neither. Its program takes them from the query itself, so that the answer
+    for one point depends on the other points of the query.
 
     Args:
-        path: of the ``.npy`` file; one row may be written without its axis.
-        columns: of a row.
-        what: a row is, for a refusal: "vertices x y z, m".
+        given: bounds that were given at the import; None if there are none.
+        queried: ``(n, 3)`` points of the query.
+        of_query: whether to take the query's own, as the published program does.
+        option: option of the import that takes the bounds.
+        what: noun for a point in messages.
+        unit: unit of the coordinates.
 
     Raises:
-        WrongUse: there is no such file.
-        DataRefused: it holds something else, or numbers that are not finite.
+        WrongUse: no bounds were given.
+        OutOfDomain: a point outside of the bounds.
     """
-    require_file(path, "query file", "give a .npy file as ObjectFolder's")
-    require_readable(path, "a query file", _MOST_BYTES)
-    found = read_array(path, "queries")
-    if found.ndim == 1 and found.size == columns:
-        found = found[None]
-    if found.dtype.kind not in "fiu" or found.ndim != 2 or found.shape[1] != columns:
-        raise DataRefused(f"{path} holds {found.dtype} {found.shape}, not rows of {columns}: {what}")
-    if not 1 <= len(found) <= MOST_ROWS:
-        raise DataRefused(f"{path} has {len(found)} rows; give 1 to {MOST_ROWS}")
-    rows = found.astype(np.float64)
-    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-    if len(bad):
-        raise DataRefused(f"{path}: row {bad[0]} is {found[bad[0]].tolist()}, not finite; write it again")
-    return read_only(rows)
-
-
-def require_pairs(first: FloatArray, second: FloatArray, what: str) -> None:
-    """Refuse two files of different numbers of rows; ``what`` names both."""
-    if len(first) != len(second):
-        raise DataRefused(f"{len(first)} and {len(second)} rows of {what}; give one of each for each query")
+    if of_query:
+        return float(queried.min()), float(queried.max())
+    if given is None:
+        raise WrongUse(
+            "the object was imported without the bounds of its coordinates, which ObjectFolder 1.0 does not "
+            f"publish: import the file again with {option} LOW HIGH in {unit}, or say --objectfolder-compat "
+            "to take the query's own, as its program does"
+        )
+    require_trained(queried, *given, what, unit)
+    return given

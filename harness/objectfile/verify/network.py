@@ -8,7 +8,7 @@ from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused
 from harness.objectfile.entries import Domain, Input, NetworkEntry, SelfTest, Tensor
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.published.folder import PublishedObject
+from harness.objectfile.published.entries import PublishedObject
 from harness.objectfile.runtime import Network
 from harness.objectfile.self_test import require_self_test
 from harness.objectfile.surface_search import SurfaceSearch

@@ -9,9 +9,9 @@ import numpy as np
 from harness.basics.errors import DataRefused, TouchstoneError
 from harness.basics.files.lock_file import FOLDER_LOCK
 from harness.objectfile.audio.audio import open_audio
-from harness.objectfile.entries import FileEntry, NetworkEntry
+from harness.objectfile.entries import FileEntry
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.published.folder import PublishedObject
+from harness.objectfile.published.entries import PublishedObject
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.verify.network import look_at_domain, look_at_graph, look_at_self_test, opened_once
 from harness.objectfile.verify.touch import look_at_codes
@@ -35,27 +35,24 @@ class Check:
     said: str  #: what was found; where it does not hold, what to do.
 
 
-def verify(of: ObjectFile) -> list[Check]:
-    """Look at everything; a failure ends its own check alone."""
+def verify(of: ObjectFile | PublishedObject) -> list[Check]:
+    """Look at everything; a failure ends its own check alone. An import has no mesh to look at."""
     return [_tried(name, look) for name, look in _looks(of)]
 
 
-def verify_published(of: PublishedObject) -> list[Check]:
-    """Look at all of a folder of imported networks that can be looked at without mesh and material."""
-    return [_tried(name, look) for name, look in _published_looks(of)]
-
-
-def _published_looks(of: PublishedObject) -> Iterator[tuple[str, Callable[[], str]]]:
-    yield from _of_files(of)
-    for sense, network in of.description.networks.items():
-        yield from _of_network(of, sense, network)
-
-
-def _looks(of: ObjectFile) -> Iterator[tuple[str, Callable[[], str]]]:
-    yield from _of_files(of)
-    yield "mesh", partial(_mesh, of)
+def _looks(of: ObjectFile | PublishedObject) -> Iterator[tuple[str, Callable[[], str]]]:
+    for entry in of.description.files:
+        yield f"{entry.file}: bytes", partial(_bytes, of, entry)
+    yield "folder: nothing else", partial(_no_others, of)
+    if isinstance(of, ObjectFile):
+        yield "mesh", partial(_mesh, of)
     for modality, network in of.description.networks.items():
-        yield from _of_network(of, modality, network)
+        run = opened_once(of, network)
+        yield f"{modality}: graph", partial(look_at_graph, run)
+        yield f"{modality}: domain", partial(look_at_domain, of, run)
+        yield f"{modality}: self-test", partial(look_at_self_test, run, network.self_test)
+    if isinstance(of, PublishedObject):
+        return
     audio = of.description.audio
     if audio is not None and audio.table is not None:
         yield "audio: table", partial(_table, of)
@@ -68,21 +65,6 @@ def _looks(of: ObjectFile) -> Iterator[tuple[str, Callable[[], str]]]:
     if vision is not None:
         yield "vision: networks", partial(look_at_networks, of, vision)
         yield "vision: networks and surface", partial(look_at_looks, of, vision)
-
-
-def _of_files(of: ObjectFile | PublishedObject) -> Iterator[tuple[str, Callable[[], str]]]:
-    for entry in of.description.files:
-        yield f"{entry.file}: bytes", partial(_bytes, of, entry)
-    yield "folder: nothing else", partial(_no_others, of)
-
-
-def _of_network(
-    of: ObjectFile | PublishedObject, name: str, network: NetworkEntry
-) -> Iterator[tuple[str, Callable[[], str]]]:
-    run = opened_once(of, network)
-    yield f"{name}: graph", partial(look_at_graph, run)
-    yield f"{name}: domain", partial(look_at_domain, of, run)
-    yield f"{name}: self-test", partial(look_at_self_test, run, network.self_test)
 
 
 def _tried(name: str, look: Callable[[], str]) -> Check:

@@ -10,7 +10,7 @@ from harness.authoring.vision.data import around
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.mesh import Mesh
-from harness.objectfile.published.camera import FOCAL, SIZE
+from harness.objectfile.published.look import FOCAL, SIZE
 from harness.objectfile.published.volume_render import stretched_sigmoid
 from harness.picture.pinhole import DirectionalLight
 

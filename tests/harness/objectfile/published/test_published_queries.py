@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
-from harness.objectfile.published.camera import views_of
-from harness.objectfile.published.query import read_rows, require_in_box, require_pairs
+from harness.objectfile.published.answers import read_rows
+from harness.objectfile.published.look import views_of
+from harness.objectfile.published.query import require_trained
 from tests.oracles import objectfolder_formulas as formulas
 
 
@@ -56,11 +57,9 @@ def test_a_damaged_file_is_refused(data: bytes, tmp_path: Path) -> None:
 def test_a_point_outside_of_the_trained_box_is_named_and_one_at_its_rim_is_not() -> None:
     low, high = np.array([-0.1, 0.0, 0.2]), np.array([0.1, 0.3, 0.4])
     rim = np.stack([low, high]).astype(np.float32).astype(np.float64)
-    require_in_box(rim, low, high, "strike")
+    require_trained(rim, low, high, "strike", "m")
     with pytest.raises(OutOfDomain, match=r"strike 1 at \(0, 0\.31, 0\.3\) m .*1 of 2"):
-        require_in_box(np.array([[0.0, 0.1, 0.3], [0.0, 0.31, 0.3]]), low, high, "strike")
-    with pytest.raises(DataRefused, match="2 and 1 rows"):
-        require_pairs(np.zeros((2, 3)), np.zeros((1, 3)), "vertices and forces")
+        require_trained(np.array([[0.0, 0.1, 0.3], [0.0, 0.31, 0.3]]), low, high, "strike", "m")
 
 
 @pytest.mark.parametrize("eye", [(1.2, -1.5, 1.6), (-1.0, 0.1, 0.2), (0.0, -1.0, 0.0), (0.3, 0.4, -2.0)])

@@ -10,19 +10,24 @@ import pytest
 
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.published.folder import PublishedObject
-from harness.objectfile.published.look import CellNetworks, open_look
+from harness.objectfile.published.answers import QuerySettings, answer_queries
+from harness.objectfile.published.entries import (
+    PublishedColoursEntry,
+    PublishedDepthEntry,
+    PublishedGainsEntry,
+    PublishedObject,
+)
+from harness.objectfile.published.look import CellNetworks, PublishedLook
 from harness.objectfile.published.sound import (
-    PublishedGains,
     compat_sounds,
-    open_gains,
-    open_spectra,
+    mode_gains,
     peak_normalised,
-    rung,
+    spectrum_sounds,
+    sum_modes,
 )
 from harness.objectfile.published.taxim_picture import TaximPicture, table_colours
-from harness.objectfile.published.touch import PublishedColours, PublishedDepths, open_colours, open_depths
-from harness.objectfile.verify.verify import verify_published
+from harness.objectfile.published.touch import touch_images, touch_maps
+from harness.objectfile.verify.verify import verify
 from tests.samples.object_bench import egg_file
 from tests.samples.published_objects import committed_object, without_bounds
 
@@ -37,19 +42,19 @@ def first(tmp_path_factory: pytest.TempPathFactory) -> PublishedObject:
     return without_bounds(tmp_path_factory.mktemp("published") / "old")
 
 
-def gains(of: PublishedObject) -> PublishedGains:
+def gains(of: PublishedObject) -> PublishedGainsEntry:
     assert of.description.audio_gains is not None
-    return open_gains(of, of.description.audio_gains)
+    return of.description.audio_gains
 
 
-def depths(of: PublishedObject) -> PublishedDepths:
+def depths(of: PublishedObject) -> PublishedDepthEntry:
     assert of.description.touch_depth is not None
-    return open_depths(of, of.description.touch_depth)
+    return of.description.touch_depth
 
 
-def colours(of: PublishedObject) -> PublishedColours:
+def colours(of: PublishedObject) -> PublishedColoursEntry:
     assert of.description.touch_colours is not None
-    return open_colours(of, of.description.touch_colours)
+    return of.description.touch_colours
 
 
 POINT = np.array([[0.0, 0.02, 0.05]])
@@ -57,17 +62,16 @@ POINT = np.array([[0.0, 0.02, 0.05]])
 
 def test_a_mode_rings_as_it_is_written() -> None:
     times = np.arange(4410) / 44100
-    found = rung(np.array([[2.0], [-1.0]]), np.array([440.0]), np.array([3.0]), 4410, 44100.0)
+    found = sum_modes(np.array([[2.0], [-1.0]]), np.array([440.0]), np.array([3.0]), 4410, 44100.0)
     assert found[0] == pytest.approx(2.0 * np.exp(-3.0 * times) * np.sin(2 * np.pi * 440 * times), abs=1e-12)
     assert found[1] == pytest.approx(-0.5 * found[0])
 
 
 def test_a_compatible_sound_knows_the_sign_of_a_force_and_not_its_size(second: PublishedObject) -> None:
-    sound, force = gains(second), np.array([[0.2, -0.7, 1.0]])
-    one, ten, back = (
-        compat_sounds(sound.amplitudes(POINT, scale * force), sound.frequencies, sound.dampings)[0]
-        for scale in (1.0, 10.0, -1.0)
-    )
+    entry, force = gains(second), np.array([0.2, -0.7, 1.0])
+    amplitudes = mode_gains(second, entry, POINT) @ force
+    modes = np.array(entry.frequencies_hz), np.abs(entry.dampings_per_s)
+    one, ten, back = (compat_sounds(scale * amplitudes, *modes)[0] for scale in (1.0, 10.0, -1.0))
     assert one.shape == (132300,)
     assert not one[:2].any()
     assert not one[2 + 88200 :].any()
@@ -76,44 +80,49 @@ def test_a_compatible_sound_knows_the_sign_of_a_force_and_not_its_size(second: P
     assert back == pytest.approx(-one)
 
 
-def test_a_force_of_zero_and_a_silent_sound_are_refused_and_never_divided_by(second: PublishedObject) -> None:
+@pytest.mark.parametrize("name", ["kilo", "first"])
+def test_a_force_of_zero_and_a_silent_sound_are_refused_and_never_divided_by(
+    name: str, tmp_path: Path
+) -> None:
+    rows = np.repeat(POINT, 2, axis=0), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    settings = QuerySettings(8, 0.1, 44100.0, compat=False, calibration=None, metres_per_unit=None)
     with pytest.raises(OutOfDomain, match="force 1 is zero"):
-        gains(second).amplitudes(np.repeat(POINT, 2, axis=0), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+        answer_queries(committed_object(name), {"audio": rows}, settings, tmp_path)
     with pytest.raises(OutOfDomain, match="silent"):
         peak_normalised(np.zeros((1, 5)))
 
 
 def test_a_strike_outside_of_the_trained_box_is_refused(second: PublishedObject) -> None:
     with pytest.raises(OutOfDomain, match="strike 0"):
-        gains(second).at(POINT + 1.0)
+        mode_gains(second, gains(second), POINT + 1.0)
 
 
 @pytest.mark.parametrize(
     ("press", "said"),
     [
-        ((0.3, 0.0, 1e-3), "tilt of 17.1887 deg"),
-        ((-0.01, 0.0, 1e-3), "tilt of -0.57"),
-        ((0.0, 0.0, 2.1e-3), "depth of 2.1 mm"),
-        ((0.0, 0.0, 0.4e-3), "depth of 0.4 mm"),
+        ((0.3, 0.0, 1e-3), r"tilt 0 at \(17.1887\) deg"),
+        ((-0.01, 0.0, 1e-3), r"tilt 0 at \(-0.57"),
+        ((0.0, 0.0, 2.1e-3), r"depth 0 at \(2.1\) mm"),
+        ((0.0, 0.0, 0.4e-3), r"depth 0 at \(0.4\) mm"),
     ],
 )
 def test_a_press_that_was_not_trained_is_refused(
     second: PublishedObject, press: tuple[float, ...], said: str
 ) -> None:
     with pytest.raises(OutOfDomain, match=said):
-        depths(second).maps(POINT, np.array([press]))
+        touch_maps(second, depths(second), POINT, np.array([press]))
 
 
 def test_presses_at_the_limits_are_allowed_and_an_azimuth_is_an_angle(second: PublishedObject) -> None:
     gel = np.array([[np.radians(15), 1.0, 2e-3], [np.radians(15), 1.0 + 2 * np.pi, 2e-3], [0.0, 0.0, 0.5e-3]])
-    maps = depths(second).maps(np.repeat(POINT, 3, axis=0), gel)
+    maps = touch_maps(second, depths(second), np.repeat(POINT, 3, axis=0), gel)
     assert np.isfinite(maps).all()
     assert maps[0] == pytest.approx(maps[1], rel=1e-3)
 
 
 def test_a_look_answers_a_point_alike_in_any_company(second: PublishedObject) -> None:
     assert second.description.vision is not None
-    field = open_look(second, second.description.vision).coarse.raw
+    field = PublishedLook.open(second, second.description.vision).coarse
     random = np.random.default_rng(0)
     points, views = random.uniform(-0.6, 0.6, (500, 3)), random.normal(size=(500, 3))
     light = np.array([0.0, 0.6, 0.8])
@@ -124,9 +133,10 @@ def test_a_look_answers_a_point_alike_in_any_company(second: PublishedObject) ->
 
 
 def test_a_thousandth_within_the_faces_of_its_cube_a_look_is_empty(second: PublishedObject) -> None:
-    assert second.description.vision is not None
-    cells = open_look(second, second.description.vision).coarse
-    assert isinstance(cells, CellNetworks)
+    entry = second.description.vision
+    assert entry is not None
+    assert entry.cells is not None
+    cells = CellNetworks.open(second, entry.cells, second.network(entry.network))
     field = replace(cells, networks=np.zeros_like(cells.networks), occupied=None).raw
     inward = np.array([0.0, 0.9e-3, 1.1e-3, 0.1])
     for axis in range(3):
@@ -138,25 +148,24 @@ def test_a_thousandth_within_the_faces_of_its_cube_a_look_is_empty(second: Publi
 
 
 def test_a_sense_of_version_1_without_bounds_refuses_in_one_sentence(first: PublishedObject) -> None:
-    assert first.description.audio_spectrum is not None
-    sound = open_spectra(first, first.description.audio_spectrum)
-    for ask in (lambda: sound.sound(POINT[0], np.ones(3)), lambda: colours(first).images(POINT)):
-        with pytest.raises(WrongUse, match=r"imported without the bounds .*--(audio|touch)-bounds LOW HIGH"):
-            ask()
-    with pytest.raises(OutOfDomain, match="force of zero"):
-        sound.sound(POINT[0], np.zeros(3))
+    entry = first.description.audio_spectrum
+    assert entry is not None
+    with pytest.raises(WrongUse, match=r"imported without the bounds .*--audio-bounds LOW HIGH"):
+        spectrum_sounds(first, entry, POINT, np.ones((1, 3)))
+    with pytest.raises(WrongUse, match=r"imported without the bounds .*--touch-bounds LOW HIGH"):
+        touch_images(first, colours(first), POINT)
 
 
 def test_with_the_querys_bounds_a_touch_depends_on_its_company_and_with_given_ones_not(
     first: PublishedObject,
 ) -> None:
     near, far = np.array([[0.01, 0.02, 0.03]]), np.array([[0.01, 0.02, 0.03], [0.05, 0.05, 0.12]])
-    alone, company = (colours(first).images(vertices, of_query=True)[0] for vertices in (near, far))
+    alone, company = (touch_images(first, colours(first), each, of_query=True)[0] for each in (near, far))
     assert not np.array_equal(alone, company)
-    known = colours(committed_object("first"))
-    assert np.array_equal(known.images(near)[0], known.images(far)[0])
+    known = committed_object("first")
+    assert np.array_equal(*(touch_images(known, colours(known), each)[0] for each in (near, far)))
     with pytest.raises(OutOfDomain, match="press 0"):
-        known.images(np.array([[0.0, 0.0, 0.2]]))
+        touch_images(known, colours(known), np.array([[0.0, 0.0, 0.2]]))
 
 
 def test_an_untouched_gel_is_seen_as_its_background(tmp_path: Path) -> None:
@@ -218,15 +227,15 @@ def test_a_folder_of_either_kind_is_not_taken_for_the_other(second: PublishedObj
 
 def test_everything_of_an_imported_folder_is_verified_and_damage_is_found(tmp_path: Path) -> None:
     of = PublishedObject.open(shutil.copytree(committed_object("osf").folder, tmp_path / "mug"))
-    assert all(check.passed for check in verify_published(of))
+    assert all(check.passed for check in verify(of))
     path = of.folder / "vision_fine.onnx"
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     path.write_bytes(bytes(data))
-    assert "vision_fine.onnx: bytes" in [check.name for check in verify_published(of) if not check.passed]
+    assert "vision_fine.onnx: bytes" in [check.name for check in verify(of) if not check.passed]
     (of.folder / "audio.onnx").unlink()
     with pytest.raises(DataRefused, match=r"audio\.onnx is missing"):
-        gains(of)
+        mode_gains(of, gains(of), POINT)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from scipy.io import wavfile
 
 from harness.cli import invoke
-from harness.objectfile.published.folder import PublishedObject
+from harness.objectfile.published.entries import PublishedObject
 from harness.objectfile.runtime import Network
 from harness.objectfile.self_test import require_self_test
 from harness.picture.image_file import read_image
@@ -97,8 +97,8 @@ def test_touches_of_version_1_are_pictures_by_the_querys_own_bounds(
     [
         ((), "no query file"),
         (("--audio-vertices", "@vertices"), "--audio-forces go together"),
-        (("--touch-gelinfo", "@gel"), "needs --touch-vertices"),
-        (("--touch-vertices", "@vertices"), "with --touch-gelinfo"),
+        (("--touch-gelinfo", "@gel"), "--touch-vertices and --touch-gelinfo go together"),
+        (("--touch-vertices", "@vertices"), "tilt, azimuth and depth of each press"),
         (("--vision", "@views", "--metres-per-unit", "1m"), "no known size"),
         (("--vision", "@gel"), "not rows of 6"),
         (("--vision", "@views", "--seconds", "0"), "--seconds 0"),

@@ -123,7 +123,7 @@ def test_what_a_built_object_is_not_told_is_asked_for(
     points = saved(tmp_path / "v.npy", of.mesh.vertices[:1])
     for options, part in (
         (("--vision", views), "--metres-per-unit go together"),
-        (("--touch-vertices", points), "--touch-vertices needs --touch-gelinfo"),
+        (("--touch-vertices", points), "--touch-vertices and --touch-gelinfo go together"),
         (("--audio-vertices", points, "--audio-forces", points), "has no sound"),
         ((), "no query file"),
     ):

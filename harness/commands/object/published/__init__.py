@@ -1,1 +1,0 @@
-"""Commands about objects whose networks were published by others: import, query files."""
