@@ -114,7 +114,9 @@ class LabChild:
 def _begin(run: Callable[[ChildPipe], None], connection: Connection, parent: int) -> None:
     _die_with_parent(parent)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the lab's to answer
-    _leave_standard_streams()
+    # Nothing a child prints may enter the lab's answers, nor may it read what is said to the lab.
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)
     try:
         run(ChildPipe(connection, parent))
     except Exception as error:  # noqa: BLE001 - reported to the lab in one sentence, and in full on stderr
@@ -135,13 +137,6 @@ def _die_with_parent(parent: int) -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:  # it died before it could be asked
         os._exit(0)
-
-
-def _leave_standard_streams() -> None:
-    """Nothing a child prints may enter the lab's answers, nor anything said to the lab be read here."""
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.dup2(2, 1)
 
 
 def free_address() -> str:

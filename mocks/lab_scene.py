@@ -82,7 +82,10 @@ def nominal_bench(
         WrongUse: no mesh for an object that is not built in.
     """
     drawn = _own_tessellation(scene) if mesh is None else mesh
-    made = _made_scale(scene, drawn, draw)
+    made: float | None = None
+    if scene.object.is_hidden:
+        nominal = float(np.ptp(drawn.bounds, axis=0).max())
+        made = draw.hidden_size(*scene.object.sizes_of(nominal)) / nominal
     placed, factor = base_from_object.copy(), 1.0 if made is None else made
     # Grown about its anchor, it stands where it stood.
     anchor = np.array(scene.object.pose.position)
@@ -99,14 +102,6 @@ def nominal_bench(
         made_scale=made,
         drawing=None if made is None else drawn,
     )
-
-
-def _made_scale(scene: SceneFile, drawn: Mesh, draw: GapDraw) -> float | None:
-    """How much larger the object is than its drawing; None where the scene states its size."""
-    if not scene.object.is_hidden:
-        return None
-    nominal = float(np.ptp(drawn.bounds, axis=0).max())
-    return draw.hidden_size(*scene.object.sizes_of(nominal)) / nominal
 
 
 def _own_tessellation(scene: SceneFile) -> Mesh:

@@ -123,7 +123,8 @@ def _follow(model: str, start_joints: FloatArray, poses: FloatArray) -> FloatArr
     joints = [start_joints]
     for index, wanted in enumerate(poses[1:], start=1):
         nearest = kinematics.nearest_branch(model, wanted, joints[-1], ANY_TURN)
-        where = f"{index} of {len(poses) - 1} steps along the line, at {_millimetres(wanted)} in base"
+        x, y, z = 1e3 * wanted[:3, 3]
+        where = f"{index} of {len(poses) - 1} steps along the line, at ({x:.1f}, {y:.1f}, {z:.1f}) mm in base"
         if nearest is None:
             raise LimitExceeded(
                 f"straight line of the flange: out of the {model}'s reach {where}: bring the target closer"
@@ -136,11 +137,6 @@ def _follow(model: str, start_joints: FloatArray, poses: FloatArray) -> FloatArr
             )
         joints.append(nearest)
     return np.stack(joints)
-
-
-def _millimetres(pose: FloatArray) -> str:
-    x, y, z = 1e3 * pose[:3, 3]
-    return f"({x:.1f}, {y:.1f}, {z:.1f}) mm"
 
 
 def _path(joints: FloatArray, poses: FloatArray, points: FloatArray, seconds: FloatArray) -> Path:

@@ -19,11 +19,6 @@ from harness.bench.reading import Channel, Reading
 SAME_POSE: Final = 5e-3  # m between the model's flange and the controller's
 
 
-def pose_quaternion(pose: FloatArray) -> FloatArray:
-    """``(7,)`` x, y, z, qw, qx, qy, qz of UR's ``(6,)`` pose vector."""
-    return np.concatenate([pose[:3], quaternion_from_rotation(rotation_from_vector(pose[3:]))])
-
-
 def arm_state(packet: FloatArray) -> ArmState:
     """The state that a ``(pipe.WIDTH,)`` packet holds."""
     fields = pipe.FIELDS
@@ -41,7 +36,10 @@ def arm_state(packet: FloatArray) -> ArmState:
 
 def readings(packets: FloatArray, rate: float) -> tuple[Reading, ...]:
     """Joints, flange poses, wrenches and the controller's clock of ``(n, pipe.WIDTH)`` packets."""
-    poses = np.array([pose_quaternion(row) for row in packets[:, pipe.FIELDS["pose"]]]).reshape(-1, 7)
+    turns = [
+        quaternion_from_rotation(rotation_from_vector(pose[3:])) for pose in packets[:, pipe.FIELDS["pose"]]
+    ]
+    poses = np.hstack([packets[:, pipe.FIELDS["pose"]][:, :3], np.reshape(turns, (-1, 4))])
     columns = (
         ("arm.joints", "rad", "", packets[:, pipe.FIELDS["joints"]]),
         ("arm.base_from_flange", "m, 1", "base", poses),

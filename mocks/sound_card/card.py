@@ -244,7 +244,11 @@ class SoundCard:
         self.environment = {"ALSA_CONFIG_PATH": str(devices)}
         self._spawn(["pipewire", "-c", str(config)])
         self._wait(socket.exists, "PipeWire made no socket")
-        self._spawn(["wireplumber", *_policy_only()])
+        # WirePlumber links streams and leaves devices alone: by a file until 0.4, by a profile from 0.5.
+        version = [str(shutil.which("wireplumber")), "--version"]
+        stated = subprocess.run(version, capture_output=True, text=True, check=False).stdout
+        policy = ("-c", "policy.conf") if "libwireplumber 0.4" in stated else ("-p", "policy")
+        self._spawn(["wireplumber", *policy])
         # What the sink plays, and where the microphone hears it, channel by channel.
         outputs = [f"{SPEAKER}:monitor_{each}" for each in positions]
         inputs = [f"{MICROPHONE}:input_{each}" for each in positions]
@@ -298,13 +302,6 @@ class SoundCard:
     def _last_words(self) -> str:
         lines = self._log().read_text(errors="replace").strip().splitlines()
         return lines[-1] if lines else "it said nothing"
-
-
-def _policy_only() -> tuple[str, str]:
-    """Have WirePlumber link streams and leave devices alone: a file until 0.4, a profile from 0.5."""
-    command = [str(shutil.which("wireplumber")), "--version"]
-    stated = subprocess.run(command, capture_output=True, text=True, check=False).stdout
-    return ("-c", "policy.conf") if "libwireplumber 0.4" in stated else ("-p", "policy")
 
 
 def _die_with_parent() -> None:

@@ -13,7 +13,7 @@ import struct
 import sys
 import threading
 from collections import deque
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
@@ -125,12 +125,6 @@ def _earlier(samples: AnyArray, fraction: float) -> AnyArray:
     return whole.astype(np.int32)
 
 
-def _messages(stream: BinaryIO, queue: Queue, channels: int) -> None:
-    while len(header := stream.read(HEADER.size)) == HEADER.size:
-        time, size = HEADER.unpack(header)
-        queue.take(time, np.frombuffer(stream.read(size), np.int32).reshape(-1, channels))
-
-
 def main(arguments: list[str]) -> None:
     """Play the standard input until it ends."""
     import sounddevice
@@ -150,7 +144,9 @@ def main(arguments: list[str]) -> None:
     )
     with stream:
         os.write(sys.stdout.fileno(), b".")
-        _messages(sys.stdin.buffer, queue, channels)
+        while len(header := sys.stdin.buffer.read(HEADER.size)) == HEADER.size:
+            time, size = HEADER.unpack(header)
+            queue.take(time, np.frombuffer(sys.stdin.buffer.read(size), np.int32).reshape(-1, channels))
 
 
 if __name__ == "__main__":

@@ -55,11 +55,6 @@ def _elbow(c: Controller) -> Any:
     )
 
 
-def _joint_modes(c: Controller) -> Any:
-    mode = _JOINT_RUNNING if c.robot.safety.power is RobotMode.RUNNING else _JOINT_POWER_OFF
-    return (mode,) * 6
-
-
 def _state() -> dict[str, Output]:
     """What moves and what is felt."""
     joints = Output("VECTOR6D", lambda c: c.robot.mover.joints)
@@ -92,7 +87,12 @@ def _modes() -> dict[str, Output]:
     """What the controller says of itself."""
     return {
         "robot_mode": Output("INT32", lambda c: int(c.robot.safety.power)),
-        "joint_mode": Output("VECTOR6INT32", _joint_modes),
+        "joint_mode": Output(
+            "VECTOR6INT32",
+            lambda c: (
+                (_JOINT_RUNNING if c.robot.safety.power is RobotMode.RUNNING else _JOINT_POWER_OFF,) * 6
+            ),
+        ),
         "safety_mode": Output("INT32", lambda c: int(c.robot.safety.mode)),
         "safety_status": Output("INT32", lambda c: int(c.robot.safety.mode)),
         "runtime_state": Output("UINT32", lambda c: int(c.player.state)),

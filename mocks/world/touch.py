@@ -107,22 +107,16 @@ def skirt_of(blur: float, pitch: float) -> GelSkirt:
         pitch: metres a pixel.
     """
     wanted = blur / pitch
-    pyramids = [_pyramid(widest) for widest in range(_NARROWEST, _WIDEST + 1, 2)]
-    best = min(pyramids, key=lambda kernels: abs(_sigma((*kernels, R15_SKIRT.final)) - wanted))
-    return GelSkirt(best, R15_SKIRT.final, R15_SKIRT.core)
-
-
-def _pyramid(widest: int) -> tuple[int, ...]:
-    kernels = [widest]
-    while kernels[-1] // 2 | 1 >= _NARROWEST:
-        kernels.append(kernels[-1] // 2 | 1)
-    return tuple(kernels)
-
-
-def _sigma(kernels: tuple[int, ...]) -> float:
-    """Pixels: variances of blurs in a row add up."""
-    halves = [half_kernel(kernel) for kernel in kernels]
-    return float(np.sqrt(sum(2.0 * np.sum(half * np.arange(len(half)) ** 2) for half in halves)))
+    pyramids: list[tuple[float, tuple[int, ...]]] = []
+    for widest in range(_NARROWEST, _WIDEST + 1, 2):
+        kernels = [widest]
+        while kernels[-1] // 2 | 1 >= _NARROWEST:
+            kernels.append(kernels[-1] // 2 | 1)
+        # Variances of blurs in a row add up.
+        halves = [half_kernel(kernel) for kernel in (*kernels, R15_SKIRT.final)]
+        variance = sum(2.0 * np.sum(half * np.arange(len(half)) ** 2) for half in halves)
+        pyramids.append((abs(float(np.sqrt(variance)) - wanted), tuple(kernels)))
+    return GelSkirt(min(pyramids)[1], R15_SKIRT.final, R15_SKIRT.core)
 
 
 BED_MODULUS = 1.5e7

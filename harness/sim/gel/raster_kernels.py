@@ -3,19 +3,9 @@
 Faces that look at the eye are drawn first. Those that look away are hidden behind them wherever a surface
 is closed, and are asked for by the nearest depth that they could have against the farthest that
 is drawn in squares of pixels; the least depth of a pixel's line is the same in any order.
-
-Eight pixels of a z-buffer at a time.
-
-A triangle's rows are a few pixels long: as a loop over pixels they cost a jump each, and the compiler's own
-vectors only begin at rows much longer than that.
 """
 
-from typing import Any
-
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
@@ -29,20 +19,11 @@ _SQUARE = 8
 ON_EDGE = 1e-7
 """Pixels by which a triangle is widened, so that no line falls between two that share an edge."""
 
-_BYTES = 8
-
 Corners = tuple[float, float, float, float, float, float]
 """x and y of three corners in pixels, from the least y to the greatest."""
 
 Steps = tuple[float, float, float]
 """Columns a row, along the edges from the first corner to the last and to the second, and between those."""
-
-Line = tuple[float, float, float, float]
-"""z at the first pixel of a part of a row, its step from pixel to pixel, the least and the greatest there."""
-
-EIGHT = 8
-_NUMBERS = ir.VectorType(ir.DoubleType(), EIGHT)
-_INT = ir.IntType(32)
 
 
 @compiled
@@ -189,8 +170,7 @@ def draw(
     ax, ay, az = p[3, k] - p[0, k], p[4, k] - p[1, k], p[5, k] - p[2, k]
     bx, by, bz = p[6, k] - p[0, k], p[7, k] - p[1, k], p[8, k] - p[2, k]
     slope_x, slope_y = (az * by - bz * ay) / area, (bz * ax - az * bx) / area
-    quick = z_low >= span[0] and z_high <= span[1] and not wants_face and depth.size >= EIGHT
-    place = depth.ctypes.data
+    quick = z_low >= span[0] and z_high <= span[1] and not wants_face
     top = max(int(np.ceil(corners[1] - ON_EDGE)), 0)
     for i in range(top, min(int(np.floor(corners[5] + ON_EDGE)), rows - 1) + 1):
         first, last = _columns(i, columns, corners, steps)
@@ -199,8 +179,11 @@ def draw(
         z_row = p[2, k] + slope_y * (i - p[1, k]) - slope_x * p[0, k]
         if quick:
             z_first = z_row + slope_x * first
-            line = z_first, slope_x, z_low, z_high
-            _hold(place, rows * columns, i * columns + first, last - first + 1, line)
+            for j in range(first, last + 1):
+                z = z_first + slope_x * (j - first)
+                z = z if z > z_low else z_low
+                z = z if z < z_high else z_high
+                depth[i, j] = z if z < depth[i, j] else depth[i, j]
             continue
         for j in range(first, last + 1):
             z = min(max(z_row + slope_x * j, z_low), z_high)
@@ -261,54 +244,3 @@ def _reach(
         return min(left, x0, x1), max(right, x0, x1)
     x = x0 + (i - y0) * step
     return min(left, x), max(right, x)
-
-
-@compiled
-def _hold(place: int, pixels: int, at: int, count: int, line: Line) -> None:
-    """Hold ``count`` pixels from the one at ``at`` to a line, of all ``pixels`` laid out from an address."""
-    z_first, step, z_low, z_high = line
-    for start in range(at, at + count, EIGHT):
-        # The last eight of a picture may begin before the row does: those pixels are left as they are.
-        within = min(start, pixels - EIGHT)
-        before, length = np.float64(within - at), np.float64(count)
-        hold_nearer(place + _BYTES * within, z_first, step, z_low, z_high, before, length)
-
-
-def _eight(builder: Any, number: Any) -> Any:
-    """One number, eight times."""
-    alone = builder.insert_element(ir.Constant(_NUMBERS, ir.Undefined), number, ir.Constant(_INT, 0))
-    return builder.shuffle_vector(alone, alone, ir.Constant(ir.VectorType(_INT, EIGHT), [0] * EIGHT))
-
-
-def _code(
-    _typing: Any, _place: Any, _first: Any, _step: Any, _low: Any, _high: Any, _before: Any, _count: Any
-) -> Any:
-    """Eight neighbours hold the nearer of what they have and of a plane, those of a row alone.
-
-    Called with the address of the first of them, z at the row's first pixel and its step from pixel to pixel,
-    the least and the greatest z that it may have, how many pixels after the row's first one the eight begin
-    (below zero for before it) and how many the row has.
-    """
-
-    def generate(context: Any, builder: Any, _signature: Any, given: Any) -> Any:
-        place = builder.inttoptr(given[0], _NUMBERS.as_pointer())
-        first, step, low, high, before, count = (_eight(builder, number) for number in given[1:])
-        along = builder.fadd(before, ir.Constant(_NUMBERS, [float(k) for k in range(EIGHT)]))
-        # A product and a sum, never fused: the same bits on every machine.
-        z = builder.fadd(first, builder.fmul(step, along))
-        # Rounding on a steep triangle must not leave the triangle.
-        z = builder.select(builder.fcmp_ordered(">", z, low), z, low)
-        z = builder.select(builder.fcmp_ordered("<", z, high), z, high)
-        old = builder.load(place, align=8)
-        of_row = builder.and_(
-            builder.fcmp_ordered(">=", along, ir.Constant(_NUMBERS, [0.0] * EIGHT)),
-            builder.fcmp_ordered("<", along, count),
-        )
-        nearer = builder.and_(of_row, builder.fcmp_ordered("<", z, old))
-        builder.store(builder.select(nearer, z, old), place, align=8)
-        return context.get_dummy_value()
-
-    return types.void(types.int64, *[types.float64] * 6), generate
-
-
-hold_nearer: Any = intrinsic(_code)

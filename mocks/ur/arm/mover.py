@@ -179,14 +179,10 @@ class Mover:
         self.speeds = a, b, c, d, e, f
         a, b, c, d, e, f = ((new - old) / CYCLE for new, old in zip(self.speeds, speeds, strict=True))
         self.accelerations = a, b, c, d, e, f
-        self.twist = _twist(pose, self._base_from_tcp)
+        old, now = poses.translation(pose), poses.translation(self._base_from_tcp)
+        x, y, z = ((end - start) / CYCLE for start, end in zip(old, now, strict=True))
+        turn = poses.rotation_vector(poses.compose(self._base_from_tcp, poses.inverse(pose)))
+        self.twist = (x, y, z), (turn[0] / CYCLE, turn[1] / CYCLE, turn[2] / CYCLE)
         speed = math.hypot(*self.twist[0])
         if speed > TCP_SPEED_LIMIT:
             raise MotionFault(f"the tool moves at {speed:.2f} m/s; the limit is {TCP_SPEED_LIMIT} m/s")
-
-
-def _twist(old: Matrix, new: Matrix) -> Twist:
-    """Velocity and turning, in base, between two cycles."""
-    x, y, z = ((b - a) / CYCLE for a, b in zip(poses.translation(old), poses.translation(new), strict=True))
-    turn = poses.rotation_vector(poses.compose(new, poses.inverse(old)))
-    return (x, y, z), (turn[0] / CYCLE, turn[1] / CYCLE, turn[2] / CYCLE)
