@@ -71,7 +71,11 @@ def find_dots(picture: ByteArray) -> Dots:
             f"dots have a radius of {usual:.1f} px; at least {LEAST_RADIUS:g} px is wanted: take the picture "
             "at the camera's own resolution"
         )
-    fitted = [(_fitted(light, blob, _reach(blobs, k)), blob) for k, blob in enumerate(blobs)]
+    fitted = []
+    for k, blob in enumerate(blobs):
+        apart = np.hypot(*(blobs[:, :2] - blob[:2]).T)
+        nearest = float(np.min(apart[np.arange(len(blobs)) != k], initial=np.inf))
+        fitted.append((_fitted(light, blob, min(_AROUND * float(blob[2]), 0.5 * nearest)), blob))
     good = np.array([one for one, _ in fitted if one is not None]).reshape(-1, 5)
     odd = np.concatenate([odd, np.array([blob[:2] for one, blob in fitted if one is None]).reshape(-1, 2)])
     return Dots(
@@ -135,12 +139,6 @@ def _whole(boxes: AnyArray, shape: tuple[int, ...]) -> BoolArray:
     left, top, wide, high = (boxes[:, k] for k in range(4))
     inside: BoolArray = (left > 0) & (top > 0) & (left + wide < shape[1]) & (top + high < shape[0])
     return inside
-
-
-def _reach(blobs: FloatArray, k: int) -> float:
-    apart = np.hypot(*(blobs[:, :2] - blobs[k, :2]).T)
-    nearest = float(np.min(apart[np.arange(len(blobs)) != k], initial=np.inf))
-    return min(_AROUND * float(blobs[k, 2]), 0.5 * nearest)
 
 
 @dataclass(frozen=True, eq=False)

@@ -172,13 +172,14 @@ def _calibrated(
     shadow = fit_shadow(pack, change - model.rest, model.fit.centres, model.light)
     worth = None if shadow.table is None else score_shadow(pack, change, out, identity.pitch, ball)
     drawn = None if worth is None or not worth.worth else shadow
+    apart = np.median(model.plain.centres - model.fit.centres, axis=0)
     return MarkFree(
         _artefact(pictures, len(pack.images), model, identity, scores, drawn, error, misfit),
         tuple(sorted(used, key=lambda press: pictures.names.index(press.name))),
         tuple(sorted([*refused, *pictures.refused], key=lambda one: one.name)),
         model.fit.edge,
         model.circle.scatter,
-        _lean(model, ball),
+        float(np.arcsin(min(1.0, float(np.hypot(*apart)) / ball))),
         model.light.depth * identity.pitch,
         read_only(np.sqrt(out.left / np.where(out.count > 0.0, out.count, np.nan))),
         reached(model.fit.centres, model.fit.edge, *pictures.background.shape[:2]).sum(axis=0),
@@ -187,11 +188,6 @@ def _calibrated(
         pictures.background_from,
         0.0,
     )
-
-
-def _lean(model: FittedModel, ball: float) -> float:
-    apart = np.median(model.plain.centres - model.fit.centres, axis=0)
-    return float(np.arcsin(min(1.0, float(np.hypot(*apart)) / ball)))
 
 
 def _check_ball(identity: Identity, pictures: Pictures) -> None:

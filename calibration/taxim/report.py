@@ -60,9 +60,16 @@ def write_report(
     """
     folder.mkdir(parents=True, exist_ok=True)
     header, album = made.calibration.header, Album(folder)
+    cards = _cards(made)
+    if scale is not None:
+        value, within = (
+            f"{1e3 * scale.pitch.value:.4f} mm",
+            f"to {1e3 * scale.pitch.within95:.4f} mm, by the arm",
+        )
+        cards.append(("a pixel shows", value, within))
     report = {
         "title": title,
-        "cards": [*_cards(made), *([] if scale is None else [_pitch_card(scale)])],
+        "cards": cards,
         "facts": [
             *vars(header).items(),
             ("sha256", made.calibration.sha256),
@@ -92,11 +99,6 @@ def write_report(
         shadows=_shadow_lines(made),
         **_believed(made.calibration, album),
     )
-
-
-def _pitch_card(scale: ArmScale) -> tuple[str, str, str]:
-    pitch = scale.pitch
-    return ("a pixel shows", f"{1e3 * pitch.value:.4f} mm", f"to {1e3 * pitch.within95:.4f} mm, by the arm")
 
 
 def _watched(arm: ArmPresses) -> str:

@@ -17,7 +17,7 @@ from calibration.taxim.arm.touch_down import PICTURES
 from calibration.taxim.gates import LEAST_PRESSES
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
-from harness.basics.geometry import apply, inverse, rotation_about, transform
+from harness.basics.geometry import apply, rotation_about, transform
 from harness.bench.sensor import TactileSensor
 from harness.twin.bench import TwinBench
 from harness.twin.motion import STAND_OFF, PlannedContact, plan_contact
@@ -195,11 +195,3 @@ def _motion(contact: PlannedContact, bench: TwinBench, on_gel: FloatArray, deepe
     pose = contact.base_from_stand_off
     touch = STAND_OFF - deepest
     return PressMotion(contact.start, contact.travel, pose, axis, touch, STAND_OFF, on_gel)
-
-
-def ball_on_gel(
-    base_from_flange: FloatArray, flange_from_gel: FloatArray, ball_in_base: FloatArray
-) -> FloatArray:
-    """``(2,)`` m: where the ball's stated place is on the gel; it moves as the true one does."""
-    place: FloatArray = apply(inverse(base_from_flange @ flange_from_gel), ball_in_base[None])[0, :2]
-    return place

@@ -124,7 +124,17 @@ class BallPresses:
         bench.mark(step.index, PRESS)
         history = bench.arm.history(AT_REST)
         self._back(bench, motion)
-        descent = (_joined(DESCENT, seen), _way(seen, way)) if touched else ()
+        descent: tuple[Reading, ...] = ()
+        if touched:
+            times = np.concatenate([one.times for one in seen])
+            values = np.concatenate([one.values for one in seen])
+            encoded = tuple(frame for one in seen for frame in one.encoded)
+            descent = (
+                Reading(replace(seen[0].channel, name=DESCENT), times, values, encoded),
+                Reading(
+                    Channel(WAY, "m", (), "float64"), np.array([one.times[-1] for one in seen]), np.array(way)
+                ),
+            )
         channel = replace(rest.frames.channel, name=UNTOUCHED)
         untouched = Reading(channel, rest.frames.times, rest.frames.values, rest.frames.encoded)
         return (
@@ -195,17 +205,6 @@ def _numbers(settling: Settling, touched: bool) -> tuple[Reading, Reading]:
         Reading(Channel(STATE, "1, 1, s", (3,), "float64"), end, state),
         Reading(Channel(UNREST, "count", (), "float64"), times, unrest),
     )
-
-
-def _way(seen: list[Reading], way: list[float]) -> Reading:
-    times = np.array([frame.times[-1] for frame in seen])
-    return Reading(Channel(WAY, "m", (), "float64"), times, np.array(way))
-
-
-def _joined(name: str, seen: list[Reading]) -> Reading:
-    channel = replace(seen[0].channel, name=name)
-    times, values = (np.concatenate([getattr(one, part) for one in seen]) for part in ("times", "values"))
-    return Reading(channel, times, values, tuple(frame for one in seen for frame in one.encoded))
 
 
 def touch_seen(change: FloatArray) -> float:

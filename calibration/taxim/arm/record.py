@@ -13,14 +13,13 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from calibration.taxim.arm.moves import ArmScale, arm_scale
-from calibration.taxim.arm.plan import ball_on_gel
 from calibration.taxim.arm.settled import look
 from calibration.taxim.arm.touch_down import middles_at_depth, touch_downs
 from calibration.taxim.pictures import Pictures, PressPack, Refused, set_digest
 from calibration.taxim.smooth_fit import distance
-from harness.basics.arrays import BoolArray, ByteArray, FloatArray, block_means, read_only
+from harness.basics.arrays import ByteArray, FloatArray, block_means, read_only
 from harness.basics.errors import CalibrationRefused, RecordingDamaged
-from harness.basics.geometry import rotation_from_quaternion, transform
+from harness.basics.geometry import apply, inverse, rotation_from_quaternion, transform
 from harness.bench.reading import Reading
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
@@ -177,13 +176,13 @@ def press_name(step: int) -> str:
 
 
 def _on_gel(poses: Reading, recording: Recording) -> FloatArray:
-    """``(2,)`` m, mean over the packets that came with the picture."""
+    """``(2,)`` m: the ball's stated place on the gel, mean over the packets that came with it."""
     station = RunFiles(recording).station
     ball = np.asarray(recording.header.plan["ball_in_base_m"], dtype=np.float64)
-    each = [
-        ball_on_gel(transform(rotation_from_quaternion(pose[3:]), pose[:3]), station.flange_from_gel, ball)
-        for pose in poses.values
-    ]
+    each = []
+    for pose in poses.values:
+        base_from_flange = transform(rotation_from_quaternion(pose[3:]), pose[:3])
+        each.append(apply(inverse(base_from_flange @ station.flange_from_gel), ball[None])[0, :2])
     if not each:
         raise RecordingDamaged(f"{recording.folder}: a press without the arm's pose")
     return np.asarray(np.mean(each, axis=0), dtype=np.float64)
@@ -274,12 +273,8 @@ def rest_change(pack: PressPack, change: FloatArray) -> FloatArray:
     sigma = _FINE * float(np.median(pack.radii))
     share = np.maximum(gaussian_filter(seen.astype(np.float64), sigma), 1e-6)
     slow = gaussian_filter(rest, (sigma, sigma, 0.0)) / share[..., None]
-    corrected: FloatArray = _faded(seen, _SEAM * sigma)[..., None] * (rest - slow)
-    return corrected
-
-
-def _faded(seen: BoolArray, width: float) -> FloatArray:
-    """1 well within what is seen, 0 outside, and linear over ``width`` pixels between: no seam."""
     if seen.all():
-        return np.ones(seen.shape)
-    return np.minimum(distance_transform_edt(seen) / width, 1.0)
+        return rest - slow
+    # Linear between what is seen and what is not: no seam.
+    faded = np.minimum(distance_transform_edt(seen) / (_SEAM * sigma), 1.0)
+    return np.asarray(faded[..., None] * (rest - slow))

@@ -91,9 +91,11 @@ def middles_at_depth(descents: list[FloatArray], ball: float) -> FloatArray:
 
 def _contact(change: FloatArray, ball: float) -> FloatArray:
     """The strength of change within reach of one contact: ``(pictures, rows, columns)`` grey levels."""
-    strength = np.stack([_strength(picture) for picture in change]) if len(change) else np.zeros((0, 1, 1))
-    if not len(strength):
-        return strength
+    if not len(change):
+        return np.zeros((0, 1, 1))
+    # The root of the energy of all channels.
+    blurred = [gaussian_filter((picture**2).sum(axis=2), BLUR) for picture in change]
+    strength = np.sqrt(np.stack(blurred).astype(np.float64))
     smooth = gaussian_filter(strength[min(2, len(strength) - 1)], _FIND)
     row, column = np.unravel_index(int(np.argmax(smooth)), smooth.shape)
     centre = np.array([float(column), float(row)])
@@ -104,12 +106,6 @@ def _contact(change: FloatArray, ball: float) -> FloatArray:
         weight = np.maximum(strongest - 0.15 * strongest.max(), 0.0)
         centre = _middle(weight)
     return np.asarray(strength * near)
-
-
-def _strength(change: FloatArray) -> FloatArray:
-    """Root of the energy of all channels: ``(rows, columns)`` grey levels."""
-    energy = (change**2).sum(axis=2)
-    return np.sqrt(np.asarray(gaussian_filter(energy, BLUR), dtype=np.float64))
 
 
 def _began(contact: FloatArray, way: Descent) -> FloatArray:
