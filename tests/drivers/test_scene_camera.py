@@ -91,5 +91,5 @@ def test_what_no_bench_has_is_refused() -> None:
             ask(camera_at(None), SCENE, MESH)
     middle = apply(SCENE.base_from_object(MESH), MESH.bounds.mean(axis=0)[None])[0]
     inside = SCENE.model_copy(update={"lights": (Light.model_construct(position=tuple(middle)),)})
-    with pytest.raises(OutOfDomain, match="direction"):
+    with pytest.raises(OutOfDomain, match="light"):
         scene_lamps(inside, MESH)

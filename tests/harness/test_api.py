@@ -54,10 +54,10 @@ def test_a_recording_is_answered_and_nothing_is_written(tmp_path: Path) -> None:
 
 
 def test_bad_input_is_named(tmp_path: Path) -> None:
-    with pytest.raises(OutOfDomain, match="off the"):
+    with pytest.raises(OutOfDomain, match=r" mm .* 2 mm"):
         tactile_image("builtin:mug", (0.5, 0.0, 0.0))
     for depth in (2.6e-3, 80e-3):
-        with pytest.raises(OutOfDomain, match=r"this gel is 2\.5 mm thick"):
+        with pytest.raises(OutOfDomain, match=r"2\.5 mm"):
             tactile_image("builtin:mug", (-0.04, 0.0, 0.05), depth)
     with pytest.raises(WrongUse, match=r"no run\.json"):
         answer(tmp_path)

@@ -84,7 +84,7 @@ def test_a_lab_that_does_not_start_says_why_and_is_gone(tmp_path: Path, behaviou
     made = lab(tmp_path, behaviour)
     with pytest.raises(BenchFault, match=said):
         made.start()
-    with pytest.raises(BenchFault, match="mocked lab"):
+    with pytest.raises(BenchFault, match="station"):
         made.mark(0, 0)
 
 

@@ -104,7 +104,7 @@ def test_what_a_budget_buys_lies_on_the_front(cloud: list[Point], budget: float)
 @pytest.mark.parametrize("odd", [math.nan, math.inf, -1.0])
 @pytest.mark.parametrize("name", ["error", "radius", "shared", "cpu", "wall"])
 def test_a_number_that_cannot_be_is_refused(name: str, odd: float) -> None:
-    with pytest.raises(WrongUse, match="finite and not negative"):
+    with pytest.raises(WrongUse, match=r"radius .*finite"):
         replace(sample(), **{name: odd})  # type: ignore[arg-type]  # the point of the test
 
 
@@ -115,14 +115,14 @@ def test_an_answer_in_no_time_was_not_measured() -> None:
 
 @pytest.mark.parametrize("odd", [0.0, -1.0, math.nan, math.inf])
 def test_a_budget_or_error_that_cannot_be_kept_is_refused(odd: float) -> None:
-    with pytest.raises(WrongUse, match="above zero"):
+    with pytest.raises(WrongUse, match="budget"):
         best_within([point("p", 1.0, 1e-3)], odd)
 
 
 def test_a_run_is_counted_once_at_each_setting() -> None:
-    with pytest.raises(WrongUse, match="each run once"):
+    with pytest.raises(WrongUse, match="2 samples of 1 runs"):
         Point("p", {}, CONDITION, (sample("a"), sample("a")))
-    with pytest.raises(WrongUse, match="each run once"):
+    with pytest.raises(WrongUse, match="0 samples"):
         Point("p", {}, CONDITION, ())
 
 
@@ -134,7 +134,7 @@ def test_the_bound_on_the_next_run_holds_as_often_as_it_says() -> None:
 
 
 def test_a_bound_needs_more_than_one_run() -> None:
-    with pytest.raises(WrongUse, match="two or more"):
+    with pytest.raises(WrongUse, match="1 values"):
         predicted_at_most(np.array([1.0]))
 
 
@@ -357,9 +357,7 @@ def test_a_curve_is_stale_when_the_machine_or_the_code_changes_and_only_then() -
     assert stale(curve(), HERE, NOW) == ()
     assert stale(curve(), HERE, {**NOW, "git": "another commit"}) == ()
     assert any("cores was 2, is 4" in reason for reason in stale(curve(), {**HERE, "cores": "4"}, NOW))
-    assert any(
-        "code has changed since 1234" in reason for reason in stale(curve(), HERE, {**NOW, "sha256": "cd"})
-    )
+    assert any("1234" in reason for reason in stale(curve(), HERE, {**NOW, "sha256": "cd"}))
 
 
 def test_a_curve_comes_back_from_the_disk_as_it_was(tmp_path: Path) -> None:
@@ -406,7 +404,7 @@ def broken(change: str) -> str:
 def test_a_damaged_curve_is_refused_by_name(tmp_path: Path, change: str) -> None:
     path = tmp_path / "curve.json"
     path.write_text(broken(change))
-    with pytest.raises(DataRefused, match=r"curve\.json is not a cost curve"):
+    with pytest.raises(DataRefused, match=r"curve\.json"):
         load(path)
 
 

@@ -35,7 +35,7 @@ def test_an_operator_sets_knobs_in_text() -> None:
     [
         ("touch.gird=60", "'touch.gird'.*'touch.grid'"),
         ("touch.grid=61", r"61.0.*30, 60, 120 \(px\)"),
-        ("touch.grid=many", "number"),
+        ("touch.grid=many", "'many'.*30, 60, 120"),
         ("touch.optics=exat", "'exat'.*'exact'"),
         ("touch.grid", "KNOB=LEVEL"),
         ("touch.optics=rough", "'rough'.* fast"),

@@ -222,7 +222,7 @@ def test_gels_are_put_together_from_what_is_said() -> None:
     assert not known_gel(None, None, background=fresh).calibration.background.any()
     cases: list[tuple[type[Exception], str, tuple[str | None, str | None], dict[str, Any]]] = [
         (WrongUse, "'gelsight-r15'.*'gelsight-r1.5'", ("gelsight-r15", None), {}),
-        (WrongUse, "--calibration", ("taxim-gelsight", None), {}),
+        (WrongUse, "--pitch 0.0295mm", ("taxim-gelsight", None), {}),
         (WrongUse, "0.2 mm", (None, None), {"pitch": 0.2e-3}),
         (WrongUse, "table of shadows", (None, None), {"shadow": True}),
         (WrongUse, "0.0295 mm", ("taxim-gelsight", "gelsight_r15_world"), {}),

@@ -28,7 +28,7 @@ def in_base(scene: SceneFile) -> list[float]:
 def test_a_bottle_stands_in_a_scene() -> None:
     scene = scene_from_options(str(BOTTLE), "plastic")
     assert in_base(scene) == pytest.approx([0.04, 0.04, 0.12], abs=1e-6)
-    assert "y is up (declared by the file), rotated to z" in known_object(scene).read[0]
+    assert "y is up (declared" in known_object(scene).read[0]
 
 
 def test_an_axis_of_the_scene_replaces_the_declared_one() -> None:
@@ -56,12 +56,12 @@ def test_tetrahedra_are_rotated_alike() -> None:
     assert as_stated is not None
     assert upright is not None
     assert upright.mesh.nodes == pytest.approx(as_stated.mesh.nodes @ UPRIGHT["y"].T, abs=1e-12)
-    assert "y is up (requested), rotated to z" in upright.said[0]
+    assert "y is up (requested)" in upright.said[0]
 
 
 def test_a_pose_that_rotates_a_declaring_file_again_is_refused() -> None:
     tree = {"mesh": str(BOTTLE), "material": "plastic", "pose": {"up": "y"}}
-    with pytest.raises(WrongUse, match="on top of that"):
+    with pytest.raises(WrongUse, match=r"up_axis = \"z\""):
         known_object(scene_from_json({"schema": 1, "object": tree}, "the test"))
     scene = scene_from_json({"schema": 1, "object": {**tree, "up_axis": "z"}}, "the test")
     assert in_base(scene) == pytest.approx([0.04, 0.04, 0.12], abs=1e-6)

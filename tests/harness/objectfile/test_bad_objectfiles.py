@@ -92,12 +92,12 @@ def test_another_hash(copy: Path, sense: str) -> None:
     path = copy / SENSES[sense].network
     data = path.read_bytes()
     path.write_bytes(data[:-1] + bytes([data[-1] ^ 1]))
-    refused(copy, sense, "was changed: its sha256 is")
+    refused(copy, sense, "sha256")
 
 
 def test_a_missing_file(copy: Path, sense: str) -> None:
     (copy / SENSES[sense].network).unlink()
-    refused(copy, sense, r"is missing; copy the whole folder again")
+    refused(copy, sense, SENSES[sense].network)
 
 
 def test_a_missing_part(copy: Path, sense: str) -> None:
@@ -112,7 +112,7 @@ def test_weights_that_are_no_numbers(copy: Path, sense: str) -> None:
         tensor.CopyFrom(numpy_helper.from_array(array, tensor.name))
 
     changed(copy, sense, spoil)
-    refused(copy, sense, "not finite")
+    refused(copy, sense, "finite")
 
 
 def test_numbers_in_another_file(copy: Path, sense: str) -> None:
@@ -123,14 +123,14 @@ def test_numbers_in_another_file(copy: Path, sense: str) -> None:
         tensor.data_location = TensorProto.EXTERNAL
 
     changed(copy, sense, move)
-    refused(copy, sense, "in another file, .*which is not read")
+    refused(copy, sense, "another file")
 
 
 def test_a_file_outside_of_the_folder(copy: Path, sense: str) -> None:
     path = copy / SENSES[sense].network
     shutil.move(path, copy.parent / path.name)
     path.symlink_to(copy.parent / path.name)
-    refused(copy, sense, "leads out of its folder")
+    refused(copy, sense, str(copy.parent / path.name))
 
 
 def test_a_name_that_leaves_the_folder(copy: Path, sense: str) -> None:
@@ -141,16 +141,16 @@ def test_a_name_that_leaves_the_folder(copy: Path, sense: str) -> None:
             elif isinstance(item, dict):
                 leave(item)
 
-    with pytest.raises(DataRefused, match=r"the name of a file beside object\.json"):
+    with pytest.raises(DataRefused, match=r"object\.json"):
         rewrite(copy, leave)
     assert f"../{SENSES[sense].network}" in (copy / "object.json").read_text()
-    refused(copy, sense, "the name of a file beside object.json")
+    refused(copy, sense, "object.json")
 
 
 def test_a_schema_of_the_future(copy: Path, sense: str) -> None:
     path = copy / "object.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"schema": 2}))
-    refused(copy, sense, "is of schema 2, this program reads 1; use the program that made it")
+    refused(copy, sense, "schema 2.* 1")
 
 
 @pytest.mark.parametrize("sense", ["audio", "touch"])
@@ -162,7 +162,7 @@ def test_another_objects_network_of_the_same_size(copy: Path, sense: str) -> Non
         tensor.CopyFrom(numpy_helper.from_array(np.ascontiguousarray(array[::-1]), tensor.name))
 
     changed(copy, sense, turn)
-    refused(copy, sense, "differs from what it gave when it was made.*another object's network")
+    refused(copy, sense, "onnxruntime")
 
 
 @pytest.mark.parametrize("sense", ["vision"])
@@ -172,7 +172,7 @@ def test_a_look_of_the_same_size_in_other_colours(copy: Path, sense: str) -> Non
     turned = numpy_helper.to_array(bias)[..., ::-1].copy()
     bias.CopyFrom(numpy_helper.from_array(turned, bias.name))
     exchange(copy, SENSES[sense].network, graph.SerializeToString())
-    refused(copy, sense, "differs from what it gave when it was made.*another object's network")
+    refused(copy, sense, "onnxruntime")
 
 
 @pytest.mark.parametrize("sides", [(0.12, 0.1, 0.08), (0.05, 0.04, 0.03)], ids=["larger", "smaller"])
@@ -192,12 +192,12 @@ def test_a_run_refuses_it_before_anything_moves(copy: Path, sense: str) -> None:
     path = copy / "mesh.ply"
     data = path.read_bytes()
     path.write_bytes(data[:-1] + bytes([data[-1] ^ 1]))
-    with pytest.raises(DataRefused, match=r"mesh\.ply was changed"):
+    with pytest.raises(DataRefused, match=r"mesh\.ply .*sha256"):
         known_object(scene_from_options(str(copy)))
 
 
 def test_a_scene_refuses_an_objectfile_of_another_object(whole: Mapping[str, Path], sense: str) -> None:
     scene = scene_from_options("builtin:bowl", objectfile=str(whole[sense]))
-    with pytest.raises(TouchstoneError, match="is not of the scene's object") as caught:
+    with pytest.raises(TouchstoneError, match=r"x .*y .*z .* mm") as caught:
         known_file(scene, known_object(scene).mesh)
     assert "\n" not in str(caught.value)

@@ -49,7 +49,7 @@ def test_one_changed_bit_is_noticed(spoiled: Path, name: str, place: float) -> N
     (spoiled / name).write_bytes(data)
     of = ObjectFile.open(spoiled)
     entry = next(entry for entry in of.description.files if entry.file == name)
-    with pytest.raises(DataRefused, match=f"{name} was changed"):
+    with pytest.raises(DataRefused, match=f"{name} .*sha256"):
         of.read(entry)
 
 
@@ -59,14 +59,14 @@ def test_a_missing_a_shortened_and_a_linked_file_are_named(spoiled: Path, name: 
     entry = next(entry for entry in of.description.files if entry.file == name)
     whole = (spoiled / name).read_bytes()
     (spoiled / name).write_bytes(whole[:-1])
-    with pytest.raises(DataRefused, match=f"{len(whole) - 1} bytes where object.json says {len(whole)}"):
+    with pytest.raises(DataRefused, match=f"{len(whole) - 1} bytes .*{len(whole)}"):
         of.read(entry)
     (spoiled / name).unlink()
-    with pytest.raises(DataRefused, match=f"{name} is missing"):
+    with pytest.raises(DataRefused, match=name):
         of.read(entry)
     (spoiled.parent / "elsewhere").write_bytes(whole)
     (spoiled / name).symlink_to(spoiled.parent / "elsewhere")
-    with pytest.raises(DataRefused, match="leads out of its folder"):
+    with pytest.raises(DataRefused, match=f"{name} .*elsewhere"):
         of.read(entry)
 
 
@@ -76,7 +76,7 @@ def test_a_file_that_never_ends_is_not_read(spoiled: Path) -> None:
     of = ObjectFile.open(spoiled)
     assert of.description.audio is not None
     assert of.description.audio.network is not None
-    with pytest.raises(DataRefused, match="missing"):
+    with pytest.raises(DataRefused, match=r"audio\.onnx"):
         of.read(of.description.audio.network)
 
 
@@ -92,34 +92,34 @@ def put(*keys: str | int, value: Any) -> Any:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (put("nmae", value="egg"), "unknown key 'nmae'.*did you mean 'name'"),
-        (put("audio", "frequency_hz", value=[]), "unknown key 'audio.frequency_hz'.*'frequencies_hz'"),
+        (put("nmae", value="egg"), "'nmae'.*'name'"),
+        (put("audio", "frequency_hz", value=[]), "'audio.frequency_hz'.*'frequencies_hz'"),
         (
             put("audio", "network", "inputs", 0, "domain", "near_surface", value=1),
-            "unknown key 'audio.network.inputs.0..domain.near_surface'.*'near_surface_m'",
+            "'audio.network.inputs.0..domain.near_surface'.*'near_surface_m'",
         ),
         (
             put("audio", "network", "self_test", "outputs", 0, "value", value=1),
-            "did you mean 'values'",
+            "value'.*'values'",
         ),
-        (put("schema", value=2), "of schema 2, this program reads 1"),
+        (put("schema", value=2), "schema 2.* 1"),
         (put("units", value="mm"), "'units' = 'mm'"),
-        (put("mesh", "file", value="../egg/mesh.ply"), "the name of a file beside object.json"),
-        (put("mesh", "file", value="/etc/passwd"), "the name of a file beside object.json"),
-        (put("mesh", "file", value="object.json"), "the name of a file beside object.json"),
-        (put("mesh", "file", value="audio.onnx"), "'audio.onnx' is named twice"),
+        (put("mesh", "file", value="../egg/mesh.ply"), "object.json"),
+        (put("mesh", "file", value="/etc/passwd"), "object.json"),
+        (put("mesh", "file", value="object.json"), "object.json"),
+        (put("mesh", "file", value="audio.onnx"), "'audio.onnx'"),
         (put("mesh", "bytes", value=2**40), "mesh.bytes"),
         (put("mesh", "sha256", value="abc"), "mesh.sha256"),
         (put("audio", "mass_kg", value="0.3 kg"), "audio.mass_kg"),
         (put("audio", "mass_kg", value=-0.3), "audio.mass_kg"),
-        (put("audio", "dampings_per_s", value=[1.0]), "7 frequencies and 1 dampings"),
-        (put("audio", "frequencies_hz", 2, value=1.0), "must ascend"),
+        (put("audio", "dampings_per_s", value=[1.0]), "7 frequencies .*1 dampings"),
+        (put("audio", "frequencies_hz", 2, value=1.0), "ascend"),
         (put("audio", "near_surface_m", value=0.005), "near_surface_m = 0.005"),
         (put("audio", "network", "outputs", 0, "shape", value=["n", 8, 3]), "gains \\(n, 7, 3\\)"),
-        (put("audio", "network", "inputs", 0, "shape", value=[4, 3]), "must begin with 'n'"),
-        (put("audio", "network", "self_test", "outputs", 0, "name", value="gain"), "self_test is of"),
+        (put("audio", "network", "inputs", 0, "shape", value=[4, 3]), "'n'"),
+        (put("audio", "network", "self_test", "outputs", 0, "name", value="gain"), "self_test"),
         (put("audio", "network", "self_test", "tolerance", value=10.0), "tolerance"),
-        (put("audio", "table", "scales", value=[1.0]), "scales of the table"),
+        (put("audio", "table", "scales", value=[1.0]), "scales"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
@@ -131,12 +131,12 @@ def test_what_the_description_may_not_say(spoiled: Path, change: Any, said: str)
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "not JSON"),
-        ("[1, 2", "not JSON"),
-        ("[" * 100_000, "not JSON"),
+        ("", "JSON"),
+        ("[1, 2", "JSON"),
+        ("[" * 100_000, "JSON"),
         ("[]", "schema None"),
-        ('{"schema": 1, "schema": 1}', "'schema' is there twice"),
-        ('{"schema": 1, "mass_kg": NaN}', "NaN is no number"),
+        ('{"schema": 1, "schema": 1}', "'schema' .*twice"),
+        ('{"schema": 1, "mass_kg": NaN}', "NaN"),
         ('{"schema": true}', "schema True"),
     ],
     ids=["empty", "cut", "deep", "list", "twins", "nan", "bool"],
@@ -148,12 +148,12 @@ def test_a_description_that_is_none(spoiled: Path, text: str, said: str) -> None
 
 
 def test_a_folder_without_a_description_is_no_object(tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="no ObjectFile"):
+    with pytest.raises(WrongUse, match=r"object\.json"):
         ObjectFile.open(tmp_path)
 
 
 def test_an_object_is_not_overwritten_but_its_sound_may_be(spoiled: Path) -> None:
-    with pytest.raises(WrongUse, match="holds an ObjectFile already"):
+    with pytest.raises(WrongUse, match="ObjectFile"):
         create_object(spoiled, "egg", egg(), MATERIALS["ceramic"], PROVENANCE)
     again = with_audio(ObjectFile.open(spoiled), egg_part(egg()))
     assert again.description.audio is not None
@@ -164,19 +164,17 @@ def test_a_part_is_written_with_its_own_bytes_only(egg_object: ObjectFile, spoil
     audio = egg_object.description.audio
     assert audio is not None
     of = ObjectFile.open(spoiled)
-    with pytest.raises(DataRefused, match=r"another 'audio\.onnx' than"):
+    with pytest.raises(DataRefused, match=r"'audio\.onnx'"):
         with_part(of, "audio", audio, {"audio.onnx": b"something else"})
-    with pytest.raises(DataRefused, match="does not name"):
+    with pytest.raises(DataRefused, match=r"notes\.txt"):
         with_part(of, "audio", audio, {"notes.txt": b"x"})
     bare = create_object(spoiled.parent / "bare", "egg", egg(), MATERIALS["ceramic"], PROVENANCE)
-    with pytest.raises(DataRefused, match="of which no bytes were given"):
+    with pytest.raises(DataRefused, match="bytes"):
         with_part(bare, "audio", audio, {})
     assert ObjectFile.open(bare.folder).description.audio is None
 
 
-@pytest.mark.parametrize(
-    ("factor", "said"), [(0.0, "no surface"), (1e9, "within 1e.06 m"), (np.nan, "within")]
-)
+@pytest.mark.parametrize(("factor", "said"), [(0.0, "surface"), (1e9, "1e.06 m"), (np.nan, "1e.06 m")])
 def test_a_surface_that_is_none_is_refused(factor: float, said: str) -> None:
     mesh = egg()
     with pytest.raises(MeshRefused, match=said):
@@ -192,12 +190,12 @@ def test_a_surface_reads_back_in_metres() -> None:
 @pytest.mark.parametrize(
     ("damage", "said"),
     [
-        (lambda data: data[:-1], "bytes where 642 vertices"),
-        (lambda data: data.replace(b"double x", b"float x"), "not the PLY of an ObjectFile"),
-        (lambda data: data.replace(b"vertex 642", b"vertex 999999999"), "bytes where 999999999"),
-        (lambda data: data[:-4] + b"\xff\xff\xff\x7f", "no triangle of its 642"),
-        (lambda data: data[:-13] + b"\x04" + data[-12:], "no triangle of its 642"),
-        (lambda data: b"", "not the PLY"),
+        (lambda data: data[:-1], "bytes .*642 vertices"),
+        (lambda data: data.replace(b"double x", b"float x"), "PLY"),
+        (lambda data: data.replace(b"vertex 642", b"vertex 999999999"), "bytes .*999999999"),
+        (lambda data: data[:-4] + b"\xff\xff\xff\x7f", "triangle .*642"),
+        (lambda data: data[:-13] + b"\x04" + data[-12:], "triangle .*642"),
+        (lambda data: b"", "PLY"),
     ],
     ids=["short", "float", "count", "index", "quad", "empty"],
 )

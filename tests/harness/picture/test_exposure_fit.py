@@ -114,13 +114,13 @@ def test_one_brightness_tells_no_offset_but_a_gain() -> None:
     found = fit_exposure(exposed(flat, 0.01), flat, everywhere(flat), "gain")
     np.testing.assert_allclose(found.gain, GAIN + 2.0 * OFFSET, atol=0.002)
     black = np.zeros(LIGHT.shape)
-    with pytest.raises(DataRefused, match="black"):
+    with pytest.raises(DataRefused, match=r"\(0 of 1\)"):
         fit_exposure(exposed(flat, 0.01), black, everywhere(black), "gain")
 
 
 def test_pictures_of_two_things_are_refused() -> None:
     for other in (shaded(9), 1.0 - LIGHT):
-        with pytest.raises(DataRefused, match="pose"):
+        with pytest.raises(DataRefused, match=r"gain -?\d.* \+- "):
             fit_exposure(exposed(other, 0.01), LIGHT, everywhere(LIGHT))
 
 

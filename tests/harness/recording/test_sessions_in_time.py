@@ -1,5 +1,6 @@
 """A run resumed after a reboot is stamped with the time of day; steps that go backwards are reported."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +58,7 @@ def test_a_run_resumed_after_a_reboot_is_stamped_with_the_time_of_day(
 
 def test_a_session_before_the_last_step_is_refused(run: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recording_module, "now", lambda: 20.0)
-    with pytest.raises(WrongUse, match=r"clock says 2027-01-15 08:00:20\+00:00, and step 1 .*set the clock"):
+    with pytest.raises(WrongUse, match=r"2027-01-15 08:00:20\+00:00.*step 1"):
         Recording(run.folder).begin_session(1_800_000_000 * 10**9)
 
 
@@ -78,4 +79,4 @@ def test_steps_that_go_backwards_are_reported(run: Recording) -> None:
     commit(run, 2, [31.0])
     commit(run, 3, [30.5])
     (note,) = run.order_notes()
-    assert note.startswith("step 2 was recorded 83 min before step 1 ended, by the computer's clock")
+    assert re.search("step 2 .*83 min .*step 1 ", note)

@@ -99,7 +99,7 @@ def test_an_object_out_of_the_arms_reach_is_refused_with_numbers(monkeypatch: py
     scene = scene_from_json(tree, "the test")
     with pytest.raises(
         WrongUse,
-        match=r"^only 0 of 6 contacts .* to 0 of these the arm could take the gel .*another pose of the obj",
+        match=r"\b0 of 6 contacts",
     ):
         planned(scene, 1)
 

@@ -120,7 +120,7 @@ def numbers(message: str) -> dict[str, int]:
 @pytest.mark.usefixtures("hasty")
 def test_where_no_way_goes_the_message_says_how_far_it_got() -> None:
     visit = Asked(stuck=2, back=-1)
-    with pytest.raises(WrongUse, match="longer steps than 25 mm, spread ones, or another pose") as caught:
+    with pytest.raises(WrongUse, match=r"25 mm.*spread") as caught:
         sites(3, "close", visit)
     told = numbers(str(caught.value))
     assert (told["longest"], told["count"]) == (2, 3)
@@ -137,7 +137,7 @@ def test_an_object_out_of_reach_is_given_up_soon() -> None:
         asked.append(base_from_gel)
         return False
 
-    with pytest.raises(WrongUse, match="ask for fewer contacts, or another pose of the object") as caught:
+    with pytest.raises(WrongUse, match=r"contacts.*pose") as caught:
         plan_sites(RASTER, GELSIGHT_R15, POSE, 3, "spread", 1, reach)
     told = numbers(str(caught.value))
     assert told["longest"] == told["reached"] == 0
@@ -161,5 +161,5 @@ def test_every_candidate_may_follow_the_contacts_so_far() -> None:
 
 def test_where_none_may_follow_the_message_says_what_was_lacking(hasty: None) -> None:
     far = [np.array([1.0, 0.0, 0.0])]
-    with pytest.raises(WrongUse, match=r"only 0 of 1 contacts with close steps .* 0 were within 25 mm"):
+    with pytest.raises(WrongUse, match=r"0 of 1 contacts with close steps .*25 mm"):
         candidate_sites(RASTER, GELSIGHT_R15, POSE, 4, "close", 5, far)

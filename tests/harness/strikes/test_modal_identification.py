@@ -214,9 +214,9 @@ def test_no_poles_leave_all_but_the_skirt() -> None:
     [
         (np.zeros(500), "silent"),
         (np.full(500, 3.0), "silent"),
-        (np.full(500, np.nan), "not finite"),
-        (np.append(np.ones(500), np.inf), "not finite"),
-        (np.arange(20.0), "at least 64"),
+        (np.full(500, np.nan), "finite"),
+        (np.append(np.ones(500), np.inf), "finite"),
+        (np.arange(20.0), "64"),
     ],
 )
 def test_what_holds_no_decay_is_refused(signal: FloatArray, said: str) -> None:
@@ -233,7 +233,7 @@ def test_a_band_without_lines_and_a_rate_of_nothing_are_refused() -> None:
     with pytest.raises(DataRefused, match="evenly"):
         modes_of_response(np.arange(100.0) ** 1.1, np.ones((1, 100)) * np.arange(100.0))
     for frequencies in (np.arange(100.0)[::-1], np.full(100, np.nan), np.arange(99.0)):
-        with pytest.raises(DataRefused, match="one rising frequency a line"):
+        with pytest.raises(DataRefused, match="100 lines"):
             modes_of_response(frequencies, np.ones((1, 100)) * np.arange(100.0))
 
 
@@ -345,4 +345,4 @@ def test_a_tone_that_grows_is_no_mode() -> None:
     identified = modes_of_decay(ringing + hum, RATE)
     assert found(identified)[0] == pytest.approx([310.0], rel=1e-9)
     assert [pole.frequency for pole in identified.undamped] == pytest.approx([50.0], rel=1e-6)
-    assert "50 Hz does not decay" in identified.notes[0]
+    assert "50 Hz" in identified.notes[0]

@@ -137,7 +137,7 @@ def test_a_band_that_is_not_one_waveform_is_rejected() -> None:
 
 def test_rates_that_differ_are_refused() -> None:
     _, strikes = _run(10)
-    with pytest.raises(DataRefused, match="share one rate"):
+    with pytest.raises(DataRefused, match=r"48000.* Hz"):
         analyse([*strikes[:-1], replace(strikes[-1], rate=48_000.0)])
 
 
@@ -145,7 +145,7 @@ def test_a_sample_that_is_not_a_number_is_refused() -> None:
     _, strikes = _run(11)
     broken = strikes[0].pressure.copy()
     broken[-1] = np.nan
-    with pytest.raises(DataRefused, match="not finite"):
+    with pytest.raises(DataRefused, match="finite"):
         analyse([replace(strikes[0], pressure=broken), *strikes[1:]])
 
 

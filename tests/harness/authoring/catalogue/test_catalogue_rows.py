@@ -20,7 +20,7 @@ def test_the_published_catalogue_reads_whole(shared_data: Path) -> None:
     assert len(found.rows) == 1000
     assert found.excluded == ()
     assert sum(row.source is None for row in found.rows) == 28
-    assert any("28 objects have no source" in note for note in found.notes)
+    assert any("28 objects" in note for note in found.notes)
     counts = {name: len(of_materials(found, [name]).rows) for name in MATERIALS}
     assert counts["wood"] == 622
     assert sum(counts.values()) == 1000
@@ -39,7 +39,7 @@ def test_the_published_catalogue_reads_whole(shared_data: Path) -> None:
         ("2,../b,0.1,Wood,None", "name '../b' cannot name a folder"),
         ("2,,0.1,Wood,None", "name '' cannot name a folder"),
         ("2,b", "material '' is not known"),
-        ("2,b,0.1,Wood,http://x,y", "more cells than columns"),
+        ("2,b,0.1,Wood,http://x,y", "cells"),
     ],
 )
 def test_a_row_that_cannot_be_is_excluded_by_its_line_and_the_others_stay(
@@ -63,7 +63,7 @@ def test_a_header_names_columns_in_any_order(tmp_path: Path) -> None:
     text = "\ufeffmaterial,name,wall_m,mass_kg,units,mesh\nglass,vase,0.003,0.4,mm,sub/vase.stl\n"
     (row,) = read_catalogue(written(tmp_path, text)).rows
     assert row == CatalogueRow("vase", "glass", mesh="sub/vase.stl", units="mm", wall=0.003, mass=0.4)
-    with pytest.raises(WrongUse, match="unknown column 'matrial'; did you mean 'material'"):
+    with pytest.raises(WrongUse, match=r"'matrial'.*'material'"):
         read_catalogue(written(tmp_path, "name,matrial\nvase,glass\n"))
 
 
@@ -71,13 +71,13 @@ def test_toml_says_the_same_with_units(tmp_path: Path) -> None:
     text = '[[object]]\nname = "vase"\nmaterial = "glass"\nwall = "3 mm"\nmass = "400 g"\nscale = "20 cm"\n'
     (row,) = read_catalogue(written(tmp_path, text, "objects.toml")).rows
     assert row == CatalogueRow("vase", "glass", scale=0.2, wall=0.003, mass=0.4)
-    with pytest.raises(WrongUse, match="has no unit"):
+    with pytest.raises(WrongUse, match=r"wall.*'3'.*unit"):
         read_catalogue(written(tmp_path, text.replace("3 mm", "3"), "objects.toml"))
 
 
 @pytest.mark.parametrize(("text", "name"), [("", "a.csv"), ("\n\n", "a.csv"), ("name\n", "a.csv")])
 def test_a_catalogue_without_objects_is_wrong_use(tmp_path: Path, text: str, name: str) -> None:
-    with pytest.raises(WrongUse, match="lists no object"):
+    with pytest.raises(WrongUse, match=name):
         read_catalogue(written(tmp_path, text, name))
 
 
@@ -85,7 +85,7 @@ def test_a_file_that_is_no_text_is_wrong_use(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_bytes(b"\xff\xfe1,a")
     with pytest.raises(WrongUse, match="UTF-8"):
         read_catalogue(tmp_path / "a.csv")
-    with pytest.raises(WrongUse, match="there is no catalogue"):
+    with pytest.raises(WrongUse, match=r"b\.csv"):
         read_catalogue(tmp_path / "b.csv")
 
 
@@ -135,7 +135,7 @@ def test_a_spreadsheet_s_separators_are_read_and_stated(
         ("mug", 0.04, 0.19),
     ]
     assert not found.excluded
-    assert found.notes[0].startswith("the columns are separated by ")
+    assert "columns" in found.notes[0]
 
 
 def test_the_semicolons_of_the_case_are_read() -> None:
@@ -161,7 +161,7 @@ def test_a_comma_that_may_separate_thousands_is_refused(cell: str, tmp_path: Pat
 
 def test_a_decimal_comma_in_columns_of_commas_is_refused(tmp_path: Path) -> None:
     found = read_catalogue(written(tmp_path, "name,material,scale_m\nmug,steel,0,04\n"))
-    assert "more cells than columns" in found.excluded[0].reason
+    assert "cells" in found.excluded[0].reason
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le"])
@@ -174,13 +174,13 @@ def test_a_catalogue_of_any_encoding_and_line_end_is_read(encoding: str, end: st
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("name" + ",x" * 1_000_000, "line 1 has 2,000,004 characters"),
-        ("name,material\n" + "a,steel\n" * 200_000, "more than 100,000 lines"),
+        ("name" + ",x" * 1_000_000, "line 1 .*2,000,004"),
+        ("name,material\n" + "a,steel\n" * 200_000, "100,000 lines"),
         (
             "name,material\na," + '"' + "x\n" * 90_000,
-            "line 2 does not read as CSV: field larger than field limit",
+            "line 2 .*field larger than field limit",
         ),
-        ("name,material,name\na,steel,b\n", "two columns are named 'name'"),
+        ("name,material,name\na,steel,b\n", "two .*'name'"),
     ],
 )
 def test_a_hostile_catalogue_is_refused_in_a_sentence(text: str, said: str, tmp_path: Path) -> None:

@@ -123,7 +123,7 @@ def test_an_open_sheet_is_learned_from_both_sides() -> None:
 
 def test_an_object_inside_out_is_refused() -> None:
     mesh = ball(0.05, 2)
-    with pytest.raises(OutOfDomain, match=r"\b0 of \d+"):
+    with pytest.raises(OutOfDomain, match=r"\b0 of \d+ places"):
         draw_tuples(LitObject(plain(Mesh(mesh.vertices, mesh.faces[:, ::-1]), GREY)), 10, 0, NOTHING)
 
 

@@ -131,7 +131,7 @@ def test_no_rays_meet_nothing() -> None:
 @pytest.mark.parametrize(
     ("origin", "direction", "said"),
     [
-        ((0, 0, 0), (0, 0, 0), "direction"),
+        ((0, 0, 0), (0, 0, 0), "ray 0 of 1 .*direction"),
         ((0, 0, np.nan), (0, 0, 1), "finite"),
         ((0, 0, 0), (0, np.inf, 1), "finite"),
     ],

@@ -140,7 +140,7 @@ def test_weights_that_do_not_fit_are_named(nets: list[MlpWeights], said: str) ->
 def test_weights_that_are_not_finite_are_refused(bad: float) -> None:
     net = perceptron(0, 3 * MODES)
     net.layers[1][0][2, 3] = bad
-    with pytest.raises(WrongUse, match="layer 1 of the network has 1 numbers that are not finite"):
+    with pytest.raises(WrongUse, match=r"layer 1 .* 1 numbers .*finite"):
         audio_graph([net], normaliser(egg()), scales(), ENCODING)
 
 
@@ -152,5 +152,5 @@ def test_a_weight_too_large_for_half_precision_is_refused() -> None:
 
 
 def test_a_flat_box_is_refused() -> None:
-    with pytest.raises(WrongUse, match="no extent"):
+    with pytest.raises(WrongUse, match="extent"):
         Normaliser.unit_box(np.zeros(3), np.array([1.0, 1.0, 0.0]))

@@ -31,12 +31,12 @@ def test_an_impulse_keeps_its_size_and_direction(force: tuple[float, float, floa
 @pytest.mark.parametrize(
     ("force", "said"),
     [
-        ([0.0, 0.0, 0.0], "a force of 0 strikes nothing"),
-        ([0.0, float("nan"), 1.0], "not three finite numbers"),
-        ([float("inf"), 0.0, 1.0], "not three finite numbers"),
-        ([1.0, 2.0], "not three finite numbers"),
-        ([1e-300, 0.0, 0.0], "cannot be struck"),
-        ([0.0, 1e308, 1e308], "cannot be struck"),
+        ([0.0, 0.0, 0.0], "force .*0"),
+        ([0.0, float("nan"), 1.0], "finite"),
+        ([float("inf"), 0.0, 1.0], "finite"),
+        ([1.0, 2.0], "finite"),
+        ([1e-300, 0.0, 0.0], "force .* N"),
+        ([0.0, 1e308, 1e308], "force .* N"),
     ],
 )
 def test_a_force_that_strikes_nothing_is_refused(force: list[float], said: str) -> None:
@@ -105,23 +105,23 @@ def test_an_impulse_gives_every_mode_all_of_it() -> None:
 
 
 def test_what_makes_no_blow_is_refused() -> None:
-    with pytest.raises(WrongUse, match="no hammer 'nylom'"):
+    with pytest.raises(WrongUse, match="'nylom'"):
         hammer("nylom")
-    with pytest.raises(WrongUse, match="both say how hard"):
+    with pytest.raises(WrongUse, match=r"2 N .*0\.5 m/s"):
         hammered(2.0 * DOWN, hammer("steel"), CERAMIC, speed=0.5)
     for speed in (0.0, -1.0, float("nan")):
-        with pytest.raises(WrongUse, match="speed is"):
+        with pytest.raises(WrongUse, match="speed"):
             hammered(DOWN, hammer("steel"), CERAMIC, speed=speed)
-        with pytest.raises(WrongUse, match="a speed of"):
+        with pytest.raises(WrongUse, match="speed"):
             hammered(DOWN, hammer("steel"), CERAMIC, speed=speed, contact=1e-3)
-    with pytest.raises(WrongUse, match="radius is 0 m"):
+    with pytest.raises(WrongUse, match=r"radius .*0 m"):
         hammered(DOWN, hammer("steel", radius=0.0), CERAMIC)
-    with pytest.raises(WrongUse, match="mass of 0 kg"):
+    with pytest.raises(WrongUse, match=r"mass .*0 kg"):
         hammered(DOWN, hammer("steel", mass=0.0), CERAMIC, contact=1e-3)
     for contact in (0.0, float("inf")):
-        with pytest.raises(WrongUse, match="a contact of"):
+        with pytest.raises(WrongUse, match=f"contact .*{contact:g} s"):
             hammered(DOWN, hammer("steel"), CERAMIC, contact=contact)
-    with pytest.raises(WrongUse, match="a push and no blow"):
+    with pytest.raises(WrongUse, match=r"contact .*1 s .* s$"):
         hammered(DOWN, hammer("steel"), CERAMIC, contact=1.0)
-    with pytest.raises(WrongUse, match="say a speed that makes it"):
+    with pytest.raises(WrongUse, match=r"force .* N.* N"):
         hammered(DOWN, hammer("steel"), CERAMIC, speed=1e9)

@@ -118,12 +118,12 @@ def test_a_point_off_the_surface_is_refused_with_value_and_limit(
     points, normals = SurfaceSearch(egg()).spread(5)
     sound.at(points + side * NEAR * normals)
     points[3] += side * 3.0 * NEAR * normals[3]
-    with pytest.raises(OutOfDomain, match=r"1 of 5 points .* by [56](\.\d+)? mm; the limit is 2 mm"):
+    with pytest.raises(OutOfDomain, match=r"1 of 5 points .* [56](\.\d+)? mm.* 2 mm"):
         sound.at(points)
 
 
 def test_millimetres_given_as_metres_are_refused(network: ObjectAudio) -> None:
-    with pytest.raises(OutOfDomain, match="Are they in metres"):
+    with pytest.raises(OutOfDomain, match=r"4 of 4 points .* 2 mm"):
         network.at(1e3 * egg().vertices[:4])
 
 
@@ -131,15 +131,15 @@ def test_millimetres_given_as_metres_are_refused(network: ObjectAudio) -> None:
     "bad", [np.zeros(3), np.zeros((2, 2)), np.array([[0.0, np.nan, 0.0]])], ids=["1d", "2", "nan"]
 )
 def test_what_is_no_point_is_refused(network: ObjectAudio, bad: AnyArray) -> None:
-    with pytest.raises(WrongUse, match="finite numbers in metres"):
+    with pytest.raises(WrongUse, match=r"shape .*\(n, 3\)"):
         network.at(bad)
 
 
 def test_directions_must_be_unit_and_as_many(network: ObjectAudio) -> None:
     points, normals = SurfaceSearch(egg()).spread(3)
-    with pytest.raises(WrongUse, match="divided by its length"):
+    with pytest.raises(WrongUse, match=r"lengths 1 to 2"):
         network.gains(points, 2.0 * normals)
-    with pytest.raises(WrongUse, match="3 points with 2 directions"):
+    with pytest.raises(WrongUse, match=r"3 points .*2 directions"):
         network.gains(points, normals[:2])
 
 
@@ -163,9 +163,9 @@ def test_an_object_without_that_sound_says_so(spoiled: Path) -> None:
 
     part = egg_part(egg())
     only = type(part)(**{**vars(part), "graph": None})
-    with pytest.raises(DataRefused, match="has no network"):
+    with pytest.raises(DataRefused, match="network"):
         open_audio(with_audio(of, only), "network")
-    with pytest.raises(WrongUse, match="a network or a table"):
+    with pytest.raises(WrongUse, match="table=True"):
         with_audio(of, type(part)(**{**vars(part), "graph": None, "table": False}))
 
 
@@ -188,14 +188,14 @@ GOOD = np.ones((4, 2, 3), np.float16)
     ("data", "said"),
     [
         (pickled(), "holds object"),
-        (zipped(), "no .npy file of numbers"),
-        (b"", "no .npy file of numbers"),
-        (table_bytes(GOOD)[:-1], "bytes, not"),
-        (table_bytes(GOOD) + b"x", "bytes, not"),
-        (table_bytes(GOOD).replace(b"(4, 2, 3)", b"(9, 9, 9)"), "a table of float16"),
-        (table_bytes(GOOD).replace(b"'<f2'", b"'>f2'"), "a table of float16"),
-        (table_bytes(GOOD).replace(b"False", b"True "), "a table of float16"),
-        (table_bytes(np.full((4, 2, 3), np.nan, np.float16)), "24 numbers that are not finite"),
+        (zipped(), ".npy"),
+        (b"", ".npy"),
+        (table_bytes(GOOD)[:-1], "bytes"),
+        (table_bytes(GOOD) + b"x", "bytes"),
+        (table_bytes(GOOD).replace(b"(4, 2, 3)", b"(9, 9, 9)"), "float16"),
+        (table_bytes(GOOD).replace(b"'<f2'", b"'>f2'"), "float16"),
+        (table_bytes(GOOD).replace(b"False", b"True "), "float16"),
+        (table_bytes(np.full((4, 2, 3), np.nan, np.float16)), "24 numbers .*finite"),
     ],
     ids=["pickle", "zip", "empty", "short", "long", "shape", "endian", "order", "nan"],
 )
@@ -206,7 +206,7 @@ def test_a_table_that_is_none_is_refused(data: bytes, said: str) -> None:
 
 def test_a_pickle_in_the_table_s_place_is_not_loaded(spoiled: Path) -> None:
     of = exchange(spoiled, "audio_table.npy", pickled())
-    with pytest.raises(DataRefused, match="holds object"):
+    with pytest.raises(DataRefused, match="object"):
         open_audio(of, "table")
 
 
@@ -242,7 +242,7 @@ def test_near_is_what_the_nearest_place_of_any_face_says(seed: int, most: float,
         if distance <= most:
             search.require_within(point[None], most, "it")
         else:
-            with pytest.raises(OutOfDomain, match=f"by {distance * 1e3:.3g} mm"):
+            with pytest.raises(OutOfDomain, match=f"{distance * 1e3:.3g} mm"):
                 search.require_within(point[None], most, "it")
 
 

@@ -57,12 +57,12 @@ def test_a_full_scale_that_holds_the_loudest_sample_is_taken_and_a_smaller_one_r
     found = counts(tmp_path / "a.wav")
     assert np.sign(found[np.argmax(np.abs(found))]) == np.sign(wanted[np.argmax(np.abs(wanted))])
     for scale in (0.9 * loudest, 0.0, -1.0, float("nan"), float("inf")):
-        with pytest.raises(WrongUse, match="a full scale of"):
+        with pytest.raises(WrongUse, match="full scale"):
             write_wav(tmp_path / "b.wav", wanted, RATE, full_scale=scale)
     assert not (tmp_path / "b.wav").exists()
 
 
 @pytest.mark.parametrize("rate", [0.0, -44100.0, 44100.5, float("nan"), float("inf"), 3e9])
 def test_a_rate_that_the_file_cannot_say_is_refused(tmp_path: Path, rate: float) -> None:
-    with pytest.raises(WrongUse, match="say a whole number"):
+    with pytest.raises(WrongUse, match="44100"):
         write_wav(tmp_path / "a.wav", sound(), rate)

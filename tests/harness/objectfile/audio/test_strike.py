@@ -93,7 +93,7 @@ def test_modes_at_or_above_half_of_the_rate_are_left_out_and_named(audio: Object
 
 
 def test_no_mode_below_half_of_the_rate_is_refused(audio: ObjectAudio) -> None:
-    with pytest.raises(WrongUse, match="900 Hz, is not below half of 1800"):
+    with pytest.raises(WrongUse, match=r"900 Hz.* 1800"):
         strike(audio, place(audio), HammerBlow.instant([1.0, 0.0, 0.0]), DURATION, 1800.0)
 
 
@@ -105,7 +105,7 @@ def test_a_force_that_moves_no_mode_is_refused_as_silent(tmp_path: Path) -> None
     flat = replace(part, modes=replace(part.modes, shapes=shapes), graph=None)
     of = create_object(tmp_path / "flat", "flat", mesh, MATERIALS["ceramic"], Provenance(licence="CC0-1.0"))
     audio = open_audio(with_audio(of, flat), "table")
-    with pytest.raises(WrongUse, match="no mode moves along that force"):
+    with pytest.raises(WrongUse, match="mode"):
         strike(audio, place(audio), HammerBlow.instant([0.0, 0.0, 1.0]), DURATION, RATE)
     assert strike(audio, place(audio), HammerBlow.instant([0.0, 1e-3, 1.0]), DURATION, RATE).peak > 0.0
 
@@ -155,13 +155,13 @@ def test_loudness_turns_modes_into_pressure(audio: ObjectAudio) -> None:
 @pytest.mark.parametrize(
     ("duration", "rate", "said"),
     [
-        (0.0, RATE, "0 s is none"),
-        (-1.0, RATE, "-1 s is none"),
-        (float("nan"), RATE, "nan s is none"),
-        (1e-6, RATE, "has no sample"),
-        (1.0, 0.0, "0 samples per second make no sound"),
-        (1.0, float("inf"), "inf samples per second make no sound"),
-        (1e9, RATE, f"more than {MOST_SAMPLES} samples"),
+        (0.0, RATE, "0 s "),
+        (-1.0, RATE, "-1 s "),
+        (float("nan"), RATE, "nan s "),
+        (1e-6, RATE, "sample"),
+        (1.0, 0.0, "0 samples per second"),
+        (1.0, float("inf"), "inf samples per second"),
+        (1e9, RATE, f" {MOST_SAMPLES} samples"),
     ],
 )
 def test_lengths_and_rates_that_make_no_sound_are_refused(
@@ -173,7 +173,7 @@ def test_lengths_and_rates_that_make_no_sound_are_refused(
 
 def test_a_contact_of_too_many_samples_is_refused(audio: ObjectAudio) -> None:
     long = HammerBlow.lasting([0.0, 0.0, -1.0], pulse_lasting(0.1, 0.01, 0.5))
-    with pytest.raises(WrongUse, match=r"a contact of 0\.1 s has more than 65536 samples at 1e"):
+    with pytest.raises(WrongUse, match=r"0\.1 s .*65536 .*1e"):
         strike(audio, place(audio), long, 0.2, 1e6)
 
 
@@ -191,12 +191,12 @@ def test_a_point_is_moved_onto_the_surface_and_says_how_far(audio: ObjectAudio) 
 
 @pytest.mark.parametrize("off", [1.5 * NEAR, 0.5, 1e6, 1e300])
 def test_a_point_too_far_off_is_refused_with_the_limit(audio: ObjectAudio, off: float) -> None:
-    with pytest.raises(OutOfDomain, match="the limit is 2 mm"):
+    with pytest.raises(OutOfDomain, match=r" mm .*2 mm"):
         place_near(audio.surface, np.array([0.11 - 0.03 - off, -0.02, 0.05]), NEAR)
 
 
 def test_a_point_off_the_surface_is_answered_with_the_nearest_that_is_taken(audio: ObjectAudio) -> None:
-    with pytest.raises(OutOfDomain, match="say the nearest place") as refused:
+    with pytest.raises(OutOfDomain, match="nearest") as refused:
         place_near(audio.surface, np.array([0.11 - 0.03 - 5.0 * NEAR, -0.02, 0.05]), NEAR)
     nearest = [float(text) for text in str(refused.value).split("place, ")[1].split()]
     assert place_near(audio.surface, np.array(nearest), NEAR).moved < 1e-6
@@ -209,14 +209,14 @@ def test_a_point_that_is_no_number_is_refused(audio: ObjectAudio) -> None:
 
 @pytest.mark.parametrize("vertex", [-1, 642, 10**9])
 def test_a_vertex_that_the_mesh_has_not_is_refused(audio: ObjectAudio, vertex: int) -> None:
-    with pytest.raises(OutOfDomain, match="the mesh has 642, say 0 to 641"):
+    with pytest.raises(OutOfDomain, match=r"642.* 0 to 641"):
         place_of_vertex(audio.surface.mesh, vertex)
 
 
 def test_a_vertex_without_a_face_has_no_normal() -> None:
     mesh = egg(1)
     lonely = Mesh(np.vstack([mesh.vertices, [[0.11, -0.02, 0.05]]]), mesh.faces)
-    with pytest.raises(OutOfDomain, match="no face that has an area"):
+    with pytest.raises(OutOfDomain, match=r"vertex 42 .*area"):
         place_of_vertex(lonely, len(mesh.vertices))
 
 

@@ -112,7 +112,7 @@ def test_a_changed_file_is_refused(spoiled: Path) -> None:
     data = bytearray((spoiled / "vision.onnx").read_bytes())
     data[-1] ^= 1
     (spoiled / "vision.onnx").write_bytes(data)
-    with pytest.raises(DataRefused, match="was changed"):
+    with pytest.raises(DataRefused, match="sha256"):
         open_vision(ObjectFile.open(spoiled))
     assert "vision.onnx: bytes" in failures(ObjectFile.open(spoiled))
 
@@ -135,9 +135,9 @@ def test_networks_of_another_object_are_told_by_looking(spoiled: Path, box_objec
 
     found = failures(rewrite(empty.folder, say))
     assert set(found) == {"vision: self-test", "vision: networks and surface"}
-    assert "another object's network" in found["vision: networks and surface"]
+    assert "network" in found["vision: networks and surface"]
     small = surface_cells(cuboid(0.05, 0.05, 0.05), 8)
-    with pytest.raises(DataRefused, match="different objects"):
+    with pytest.raises(DataRefused, match=r"\d%.* mm"):
         with_vision(box_object, box_part(even_look(small, 1e6, LOGITS)))
 
 
@@ -147,7 +147,7 @@ def test_a_graph_that_computes_something_else_is_told(spoiled: Path) -> None:
     last.op_type = "Tanh"
     of = exchange(spoiled, "vision.onnx", model.SerializeToString())
     assert "vision: self-test" in failures(of)
-    with pytest.raises(DataRefused, match="differs from what it gave"):
+    with pytest.raises(DataRefused, match=r"vision\.onnx .*onnxruntime"):
         open_vision(of)
 
 
@@ -158,14 +158,14 @@ def test_weights_that_are_not_finite_are_refused(spoiled: Path) -> None:
     array[0, 0, 0] = np.nan
     kept.CopyFrom(numpy_helper.from_array(array, kept.name))
     found = failures(exchange(spoiled, "vision.onnx", model.SerializeToString()))
-    assert "not finite" in found["vision: graph"]
+    assert "finite" in found["vision: graph"]
 
 
 def test_networks_on_another_grid_are_not_those_described(spoiled: Path) -> None:
     grid = surface_cells(BOX, 8)
     moved = VisionGrid(grid.low + 1e-4, grid.cell, grid.cells)
     of = exchange(spoiled, "vision.onnx", file_of(even_look(moved, 1e6, LOGITS)))
-    with pytest.raises(DataRefused, match=r"least corner, m: .* where object\.json says"):
+    with pytest.raises(DataRefused, match=r"m: .*object\.json"):
         open_vision(of)
     assert "vision: networks" in failures(of)
 
@@ -173,11 +173,11 @@ def test_networks_on_another_grid_are_not_those_described(spoiled: Path) -> None
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda vision: vision.update(metres_per_unit=0.001), "must be 1"),
+        (lambda vision: vision.update(metres_per_unit=0.001), "metres_per_unit"),
         (lambda vision: vision.update(level="osf-v"), "extras|the number"),
         (lambda vision: vision["grid"].update(networks=7), "network"),
         (lambda vision: vision["grid"].update(cell_m=0.02), "points"),
-        (lambda vision: vision["grid"].update(cell_m=0.0), "greater than 0"),
+        (lambda vision: vision["grid"].update(cell_m=0.0), "cell_m"),
         (lambda vision: vision["size"].update(block=16), "points"),
         (lambda vision: vision["network"]["inputs"][1].update(unit="mm"), "points"),
         (lambda vision: vision.update(camera="OpenGL"), "camera"),
@@ -201,7 +201,7 @@ def test_a_camera_within_the_material_is_refused_and_one_beside_it_is_not(box_ob
         camera = looking(BOX, 2.0, 8)
         pose = camera.object_from_camera.copy()
         pose[:3, 3] = (0.0, away, 0.0)
-        with pytest.raises(OutOfDomain, match="within the object"):
+        with pytest.raises(OutOfDomain, match=r"\(.*\) mm.* mm"):
             vision.picture(replace(camera, object_from_camera=pose), LIGHT)
         pose[:3, 3] = (0.0, 0.0401 + away, 0.0)
         vision.picture(replace(camera, object_from_camera=pose), LIGHT)

@@ -254,12 +254,12 @@ def test_weights_that_do_not_fit_are_refused_by_name() -> None:
         VisionWeights(SMALL, SCALE, **good | {"second": good["second"][:, :-1]})
     spoiled = good["colour_bias"].copy()
     spoiled[2, 1] = np.nan
-    with pytest.raises(WrongUse, match="'colour_bias' have 1 numbers that are not finite"):
+    with pytest.raises(WrongUse, match=r"'colour_bias' .*1 numbers .*finite"):
         VisionWeights(SMALL, SCALE, **good | {"colour_bias": spoiled})
     too_large = VisionWeights(SMALL, SCALE, **good | {"density": good["density"].astype(np.float64) + 1e5})
     with pytest.raises(WrongUse, match="'density'"):
         too_large.rounded()
-    with pytest.raises(WrongUse, match="cells and"):
+    with pytest.raises(WrongUse, match=r"\d+ cells .*\d+ networks"):
         VisionModel(VisionGrid(LOW, 0.01, GRID.cells[1:]), VisionWeights(SMALL, SCALE, **good))
     with pytest.raises(WrongUse, match="scale"):
         VisionWeights(SMALL, 0.0, **good)

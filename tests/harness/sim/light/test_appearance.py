@@ -194,11 +194,11 @@ def test_scans_have_their_texture(shared_data: Path, name: str, units: str) -> N
 def test_a_scan_whose_texture_is_missing_says_so(shared_data: Path) -> None:
     made = read_appearance(shared_data / "meshes/ycb_ocrtoc/bowl/textured.obj", "m")
     assert not made.textures
-    assert any("no texture" in remark for remark in made.remarks)
+    assert any("texture" in remark for remark in made.remarks)
 
 
 def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="no mesh file"):
+    with pytest.raises(WrongUse, match=r"none\.obj"):
         read_appearance(tmp_path / "none.obj", "m")
     path = tmp_path / "empty.obj"
     path.write_text("v 0 0 0\n")
@@ -210,7 +210,7 @@ def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
         read_appearance(path, "m", 0.0)
     with pytest.raises(WrongUse, match="unit"):
         appearance_of(str(path), None)
-    with pytest.raises(WrongUse, match="no built-in"):
+    with pytest.raises(WrongUse, match="spoon"):
         appearance_of("builtin:spoon", None)
 
 
@@ -219,11 +219,11 @@ def test_an_appearance_that_is_none_is_refused() -> None:
     normals, zeros, none = smooth_normals(mesh), np.zeros((2, 3, 2)), np.full(2, -1)
     with pytest.raises(DataRefused, match="2 faces"):
         Appearance(mesh, normals[:1], np.ones((2, 3, 3)), zeros, none)
-    with pytest.raises(DataRefused, match="reflects 0 to 1"):
+    with pytest.raises(DataRefused, match=r"1\.5"):
         Appearance(mesh, normals, np.full((2, 3, 3), 1.5), zeros, none)
     with pytest.raises(DataRefused, match="textures"):
         Appearance(mesh, normals, np.ones((2, 3, 3)), zeros, np.zeros(2, np.int64))
-    with pytest.raises(OutOfDomain, match="met none"):
+    with pytest.raises(OutOfDomain, match="-1 to -1"):
         plain(mesh, (0.5, 0.5, 0.5)).albedo(np.array([-1]), np.zeros((1, 2)))
 
 

@@ -270,9 +270,9 @@ def _bomb() -> bytes:
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"", "picture"),
-        (b"not a picture", "picture"),
-        (png(PRINT)[:40], "damaged|picture"),
+        (b"", "bytes"),
+        (b"not a picture", "bytes"),
+        (png(PRINT)[:40], "damaged|bytes"),
         (_bomb(), "pixels"),
     ],
 )

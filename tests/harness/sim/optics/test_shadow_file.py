@@ -86,14 +86,14 @@ def test_nothing_in_a_file_is_run(tmp_path: Path) -> None:
     lists = as_published()
     lists[1, 2, 1] = [Trap()]
     np.savez(tmp_path / "a.npz", shadowDirections=DIRECTIONS, shadowTable=lists)
-    with pytest.raises(CalibrationRefused, match=r"shadowTable\.npy|float64"):
+    with pytest.raises(CalibrationRefused, match=r"shadowTable\.npy .*float64"):
         read_shadow_table(tmp_path / "a.npz")
     assert not Trap.sprung
 
 
 def test_what_is_no_shadow_table_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
-    with pytest.raises(CalibrationRefused, match=r"a\.npz"):
+    with pytest.raises(CalibrationRefused, match=r"a\.npz .*no such file"):
         read_shadow_table(path)
     path.write_bytes(b"not an archive")
     with pytest.raises(CalibrationRefused, match=r"a\.npz .*(damaged|archive)"):

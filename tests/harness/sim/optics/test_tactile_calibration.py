@@ -99,7 +99,7 @@ def test_what_was_tampered_with_is_refused(bench: TactileCalibration, tmp_path: 
         ("table .*float64", {"table": bench.table.astype(np.float64)}),
         ("schema 99", {"header": {"schema": 99}}),
         ("RGB", {"header": {"channel_order": "BGR"}}),
-        ("mood", {"header": {"mood": "good"}}),
+        ("header .*mood", {"header": {"mood": "good"}}),
         ("pitch -1", {"header": {"pitch": -1.0}}),
     ]
     for words, change in cases:
@@ -114,7 +114,7 @@ def test_what_was_tampered_with_is_refused(bench: TactileCalibration, tmp_path: 
 def test_what_is_no_calibration_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "d.npz"
     path.write_bytes(b"not an archive")
-    with pytest.raises(CalibrationRefused, match=r"\.npz"):
+    with pytest.raises(CalibrationRefused, match=r"d\.npz .*archive"):
         load_calibration(path)
     with pytest.raises(CalibrationRefused, match=r"absent\.npz"):
         load_calibration(tmp_path / "absent.npz")
@@ -132,7 +132,7 @@ def test_a_pickle_is_never_opened(bench: TactileCalibration, tmp_path: Path) -> 
     path = tmp_path / "e.npz"
     save_calibration(bench, path)
     _rewrite(path, support=np.array([{"a": 1}], dtype=object))
-    with pytest.raises(CalibrationRefused, match=r"\.npz"):
+    with pytest.raises(CalibrationRefused, match=r"\.npz .*numbers"):
         load_calibration(path)
 
 

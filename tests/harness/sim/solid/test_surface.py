@@ -166,5 +166,5 @@ def test_an_object_smaller_than_its_samples_is_refused() -> None:
 
 def test_a_mesh_without_area_is_refused() -> None:
     flat = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]]))
-    with pytest.raises(MeshRefused, match="surface"):
+    with pytest.raises(MeshRefused, match="area"):
         sample_surface(flat, SPACING)

@@ -85,7 +85,7 @@ def test_abaqus_input_as_its_manual_writes_it(tmp_path: Path) -> None:
 def test_four_node_cells_gain_middle_nodes_and_say_so(tmp_path: Path, reference: FloatArray) -> None:
     plain = box(SIDES, (4, 1, 1))
     found = modes_of_file(written(tmp_path / "bar.vtu", plain.nodes, plain.cells), STEEL, "m", count=6)
-    assert any("middle nodes were added" in sentence for sentence in found.said)
+    assert any("middle nodes" in sentence for sentence in found.said)
     assert found.solution.modes.frequencies == pytest.approx(reference, rel=1e-9)
 
 
@@ -102,7 +102,7 @@ def test_middle_nodes_of_one_cell_in_another_order_are_named(tmp_path: Path) -> 
     mesh = bar()
     cells = mesh.cells.copy()
     cells[5] = cells[5][[0, 1, 2, 3, 5, 4, 6, 7, 8, 9]]
-    with pytest.raises(MeshRefused, match="element 6 of 24 have a middle node far"):
+    with pytest.raises(MeshRefused, match=r"element 6 of 24 .*corners 1 to 4"):
         read_volume(written(tmp_path / "bar.vtu", mesh.nodes, cells), "m")
 
 
@@ -116,7 +116,7 @@ def test_cells_numbered_the_other_way_round_are_turned(
     cells[::3] = cells[::3][:, mirrored]
     nodes = mesh.nodes[: cells.max() + 1]
     found = modes_of_file(written(tmp_path / "bar.vtu", nodes, cells), STEEL, "m", count=6)
-    assert any("8 elements were numbered the other way round" in sentence for sentence in found.said)
+    assert any("8 elements " in sentence for sentence in found.said)
     assert found.solution.modes.frequencies == pytest.approx(reference, rel=1e-9)
     everywhere = read(written(tmp_path / "all.vtu", nodes, mesh.cells[:, :corners][:, mirrored]))
     assert not any("other way round" in sentence for sentence in everywhere.said)
@@ -135,7 +135,7 @@ def test_a_node_on_the_wrong_side_of_a_face_is_named(tmp_path: Path) -> None:
     middle = np.argmin(np.linalg.norm(plain.nodes - 0.02, axis=1))
     nodes = plain.nodes.copy()
     nodes[middle] += [0.03, 0.0, 0.0]
-    with pytest.raises(MeshRefused, match=r"element.* of 48 are inverted"):
+    with pytest.raises(MeshRefused, match=r"element.* of 48 .*inverted"):
         read_volume(written(tmp_path / "tangled.vtu", nodes, plain.cells), "m")
 
 
@@ -144,7 +144,7 @@ def test_a_cell_that_its_middle_nodes_turn_inside_out_is_named(tmp_path: Path) -
     nodes = mesh.nodes.copy()
     ends = nodes[mesh.cells[3, [0, 1]]]
     nodes[mesh.cells[3, 4]] = ends[0] + 0.15 * (ends[1] - ends[0])
-    with pytest.raises(MeshRefused, match=r"element.* 4.* inside out by their middle nodes"):
+    with pytest.raises(MeshRefused, match=r"element.* 4.*volume"):
         read_volume(written(tmp_path / "bent.vtu", nodes, mesh.cells), "m")
 
 
@@ -154,7 +154,7 @@ def test_a_sliver_is_named_with_its_quality(height: float, tmp_path: Path) -> No
     top = plain.nodes[plain.cells[0]][:3].mean(axis=0) + np.array([0.0, 0.0, height])
     nodes = np.concatenate([plain.nodes, [top]])
     cells = np.concatenate([plain.cells, [[*plain.cells[0][:3], len(plain.nodes)]]])
-    with pytest.raises(MeshRefused, match=r"element 25 of 25 are flat \(the worst quality is \d"):
+    with pytest.raises(MeshRefused, match=r"element 25 of 25 .*quality is \d"):
         read_volume(written(tmp_path / "sliver.vtu", nodes, cells), "m")
 
 
@@ -162,7 +162,7 @@ def test_a_poor_cell_is_said_with_its_number(tmp_path: Path) -> None:
     nodes = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.03, 0.03, 2e-6]])
     found = read(written(tmp_path / "poor.vtu", nodes, np.array([[0, 1, 2, 3]])))
     assert found.quality < 1e-3
-    assert any("element 1 of 1 are nearly flat" in sentence for sentence in found.said)
+    assert any("element 1 of 1 " in sentence for sentence in found.said)
 
 
 def test_two_bodies_have_twelve_rigid_motions(tmp_path: Path, reference: FloatArray) -> None:
@@ -191,7 +191,7 @@ def test_a_crack_and_a_hanging_node_are_named(tmp_path: Path) -> None:
         read_volume(written(tmp_path / "crack.vtu", nodes, cells), "m")
     hanging = mesh.cells.copy()
     hanging[0, 0] = hanging[1, 6]
-    with pytest.raises(MeshRefused, match="corner of one element"):
+    with pytest.raises(MeshRefused, match=r"\d+ nodes .*node \d"):
         read_volume(written(tmp_path / "hang.vtu", mesh.nodes, hanging), "m")
 
 
@@ -214,9 +214,9 @@ def test_metres_and_millimetres(tmp_path: Path, reference: FloatArray) -> None:
         read(written(tmp_path / "m.vtu", mesh.nodes, mesh.cells)).mesh.nodes
     )
     assert read(written(tmp_path / "m.vtu", mesh.nodes, mesh.cells), None).units == "m"
-    with pytest.raises(WrongUse, match="say --units m, cm, mm or in"):
+    with pytest.raises(WrongUse, match="--units m, cm, mm"):
         read_volume(file, None)
-    with pytest.raises(WrongUse, match="unknown unit"):
+    with pytest.raises(WrongUse, match="'furlong'"):
         read_volume(file, "furlong")
     huge = read(written(tmp_path / "huge.vtu", mesh.nodes * 1e3, mesh.cells), "m")
     assert np.ptp(huge.mesh.nodes, axis=0) == pytest.approx(np.array(SIDES) * 1e3)
@@ -248,12 +248,12 @@ def test_a_set_of_nodes_or_a_side_can_be_held(tmp_path: Path) -> None:
 def test_what_belongs_to_surfaces_is_refused_of_tetrahedra(tmp_path: Path) -> None:
     mesh = bar()
     file = written(tmp_path / "bar.vtu", mesh.nodes, mesh.cells)
-    with pytest.raises(WrongUse, match="leave --wall out"):
+    with pytest.raises(WrongUse, match="--wall"):
         modes_of_file(file, STEEL, "m", wall=1e-3)
-    with pytest.raises(WrongUse, match="leave --edge out"):
+    with pytest.raises(WrongUse, match="--edge"):
         modes_of_file(file, STEEL, "m", edge=1e-3)
-    with pytest.raises(WrongUse, match="leave --envelope out"):
+    with pytest.raises(WrongUse, match="--envelope"):
         modes_of_file(file, STEEL, "m", envelope=1e-5)
     plain = box(SIDES, (8, 2, 2))
-    with pytest.raises(WrongUse, match="too many"):
+    with pytest.raises(WrongUse, match=r"\d+ modes.*\d+ unknowns"):
         modes_of_file(written(tmp_path / "fine.vtu", plain.nodes, plain.cells), STEEL, "m", count=500)

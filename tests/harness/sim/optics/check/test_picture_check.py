@@ -97,14 +97,14 @@ def test_a_press_as_the_calibration_was_made_is_not_touched() -> None:
         assert np.array_equal(checked.image, PRESS)
         assert (checked.gain == 1.0).all()
         assert len(checked.notes) == (rest is None)
-    assert "no resting picture was given" in checked_picture(PRESS, BENCH).notes[0]
+    assert "--background" in checked_picture(PRESS, BENCH).notes[0]
     assert _scores(PRESS, UNTOUCHED) < 2.0
 
 
 @pytest.mark.parametrize("fault", TURNS.values(), ids=TURNS)
 def test_another_order_of_channels_or_orientation_is_refused(fault: Fault) -> None:
     press, rest = _turned(fault)
-    assert "camera's own channel order" in _refused(press, rest)
+    assert "channel order" in _refused(press, rest)
     assert "fits its resting gel only with" in _refused(press, None)
     assert "fits its resting gel only with" in _refused(press, UNTOUCHED)
 
@@ -230,7 +230,7 @@ def test_a_reading_deeper_than_its_gel_is_refused() -> None:
     deep = np.zeros((4, 5))
     deep[1, 2] = 2.9e-3
     require_within_gel(deep, np.full_like(deep, 0.45e-3), 2.5e-3)
-    with pytest.raises(PictureRefused, match=r"2\.90 mm deep .* 2\.50 mm"):
+    with pytest.raises(PictureRefused, match=r"2\.90 mm.* 2\.50 mm"):
         require_within_gel(deep, np.full_like(deep, 0.1e-3), 2.5e-3)
 
 
@@ -243,9 +243,9 @@ def test_a_press_deeper_than_the_gel_is_refused_or_inside_its_error(radius: floa
 
 
 def test_pictures_of_another_shape_are_refused() -> None:
-    with pytest.raises(DataRefused, match="not cropped"):
+    with pytest.raises(DataRefused, match=r"\(112, 160, 3\).*\(120, 160, 3\)"):
         checked_picture(PRESS[:-8], BENCH)
-    with pytest.raises(DataRefused, match="not cropped"):
+    with pytest.raises(DataRefused, match=r"\b152\b"):
         checked_picture(PRESS, BENCH, UNTOUCHED[:, :-8])
 
 
@@ -402,12 +402,12 @@ def test_a_wide_contact_is_read_in_the_same_light_where_its_shape_is_wanted_and_
     """A ball of 60 mm whose contact fills the view: no gel at rest is left to tell the light by."""
     surface = _surface(radius=60e-3, depth=2.0e-3)
     press, rest = _drawn(surface)
-    with pytest.raises(PictureRefused, match="over the whole view"):
+    with pytest.raises(PictureRefused, match="white balance"):
         checked_picture(press, BENCH, rest)
     wide = checked_picture(press, BENCH, rest, allow_wide=True)
     np.testing.assert_array_equal(wide.gain, np.ones(3))
     assert any("the same light is assumed" in note for note in wide.notes)
-    with pytest.raises(PictureRefused, match="over the whole view"):
+    with pytest.raises(PictureRefused, match="white balance"):
         checked_picture(_byte(0.7 * press.astype(np.float64)), BENCH, rest, allow_wide=True)
 
 

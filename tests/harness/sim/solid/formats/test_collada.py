@@ -23,7 +23,7 @@ def write(folder: Path, text: str) -> Path:
 def test_a_decimetre_is_the_file_s_unit() -> None:
     report = take_in(FILES / "decimetre.dae", None).report
     assert report.longest_side == pytest.approx(0.04, abs=1e-9)
-    assert "unit 0.1 m (declared by the file)" in report.summary
+    assert "unit 0.1 m (declared" in report.summary
 
 
 @pytest.mark.parametrize("metres", [1e-3, 0.0254, 0.3048, 0.07, 1.234, 3.0])
@@ -37,7 +37,7 @@ def test_any_factor_is_the_file_s_unit(tmp_path: Path, metres: float) -> None:
 
 @pytest.mark.parametrize("metres", ["0", "-1", "nan", "inf", "", "a metre", "1e999", "-0.0"])
 def test_a_factor_that_is_no_length_is_refused(tmp_path: Path, metres: str) -> None:
-    with pytest.raises(MeshRefused, match="states a unit of"):
+    with pytest.raises(MeshRefused, match=r"unit .* m;"):
         take_in(write(tmp_path, dae_xml(f'<unit meter="{metres}"/>')), None)
 
 
@@ -80,7 +80,7 @@ def test_nodes_of_a_library_are_placed_where_they_are_instanced(tmp_path: Path) 
 
 
 def test_geometry_that_the_scene_does_not_place_is_no_object(tmp_path: Path) -> None:
-    with pytest.raises(MeshRefused, match="places no triangle"):
+    with pytest.raises(MeshRefused, match="triangle"):
         take_in(write(tmp_path, dae_xml(nodes="<node/>")), None)
 
 
@@ -123,15 +123,15 @@ def test_a_concave_polygon_is_filled_as_it_stands(tmp_path: Path) -> None:
         (("0 1 3 0 3 2", "0 1 3 0 3 8"), "vertex 8"),
         (("0 1 3 0 3 2", "0 1 3 0 3 -1"), "vertex -1"),
         (("0 1 3 0 3 2", "0 1 3 0 3 x"), "no number"),
-        (("0.04 0.03 0.02<", "0.04 0.03<"), "states 8 elements"),
+        (("0.04 0.03 0.02<", "0.04 0.03<"), "8 elements"),
         (("0.04 0.03 0.02<", "0.04 0.03 two<"), "no number"),
-        (('url="#g"', 'url="#other"'), "no geometry of that name"),
-        (('url="#g"', 'url="other.dae#g"'), "no geometry of that name"),
-        (("<p>", "<ph><p>"), "no readable XML"),
-        (('count="8"', 'count="100000000000"'), "no 3 numbers|states 100"),
-        (('count="8"', 'count="-1"'), "no 3 numbers"),
+        (('url="#g"', 'url="#other"'), "geometry"),
+        (('url="#g"', 'url="other.dae#g"'), "geometry"),
+        (("<p>", "<ph><p>"), "XML"),
+        (('count="8"', 'count="100000000000"'), "accessor|100"),
+        (('count="8"', 'count="-1"'), "accessor"),
         (('offset="0"/><p>', 'offset="99999999999"/><p>'), "offset"),
-        (("0.04 0.03 0.02<", "0.04 0.03 nan<"), "not finite"),
+        (("0.04 0.03 0.02<", "0.04 0.03 nan<"), "finite"),
     ],
 )
 def test_damage_is_refused_with_its_place(tmp_path: Path, change: tuple[str, str], reason: str) -> None:
