@@ -16,7 +16,7 @@ from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
 from harness.effects.explain import without_sound
-from harness.effects.file_levels import NETWORK, scene_levels
+from harness.effects.file_levels import scene_levels
 from harness.effects.scene_object import known_file
 from harness.effects.touch_file_effects import SHAPES
 from harness.experiment.object_modes import ReadFile, carried_by, object_modes
@@ -103,17 +103,12 @@ def object_touch(
         objectfile: reads the object's; None for the one that the scene names.
 
     Raises:
-        WrongUse: a level that answers no candidates; or no ObjectFile, or one of another object or gel.
+        WrongUse: no ObjectFile, or one of another object or gel.
         DataRefused: an ObjectFile without that touch, or a damaged one.
     """
     level = accuracy.of(SHAPES)
     if level == SHAPES.default:
         return None
-    if level != NETWORK:
-        raise WrongUse(
-            f"{SHAPES.name} = {level}: it answers single presses, of no yaw, where an estimate compares "
-            f"thousands; take {SHAPES.name} = {NETWORK} or {SHAPES.default}"
-        )
     of = (objectfile or partial(known_file, scene, mesh))()
     if of is None:
         raise WrongUse(

@@ -94,6 +94,7 @@ class FitSpec:
     depth: int = 4  #: hidden layers.
     width: int = 256  #: of each.
     octaves: int = 10  #: of the encoding.
+    skip: int = 0  #: the layer, counted from 0, that takes the encoded input too; 0 for none.
     steps: int = 300  #: of Adam; its rate falls to zero as half a cosine.
     batch: int = 8192  #: rows in a step.
     rate: float = 2e-3  #: of the first steps.

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import torch
@@ -13,35 +11,38 @@ from experiments.paper.hexahedra import is_within
 from experiments.paper.look import REACH, FieldSpec, ViewBench, ball_of
 from experiments.paper.rendering import FitSpec
 from experiments.paper.sound import (
+    ANYWHERE,
+    AUDIONET_EPOCHS,
     SPECTRUM_INPUTS,
     SPECTRUM_OUTPUTS,
     STRIKE_SEED,
     SpectrumBasis,
     StrikeBench,
+    between_nodes,
     spectrum_pair,
 )
 from experiments.paper.touch import (
     CHANNELS,
     COLOUR_INPUTS,
     MIDDLE,
+    NETWORK_SEED,
+    PRESS_INPUTS,
     PRESS_SEED,
+    TOUCHNET_PRESSES,
+    PressInputs,
     TouchBench,
     colours_pair,
     pixel_places,
+    touchnet_pair,
 )
-from harness.authoring.audio.mlp import AudioTraining
-from harness.authoring.audio.profiles import PerceptronSpec
-from harness.authoring.perceptron import dense_layers, encode, set_rate
+from harness.authoring.audio.waves import error_shares, solve_readout
 from harness.authoring.published.modules import Osf, ScaledPerceptrons, SkipPerceptron, exported_graph
-from harness.authoring.touch.data import reference_maps, smooth_normals
-from harness.authoring.touch.mlp import TouchTraining, learned_from
-from harness.authoring.touch.profiles import TouchPerceptronSpec
-from harness.authoring.training import Report, Resumable, train
+from harness.authoring.touch.data import pressed, reference_maps, smooth_normals
+from harness.authoring.training import Report
 from harness.authoring.vision.lessons import Lessons, draw_for
 from harness.authoring.vision.places import sphere
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray
-from harness.objectfile.audio.graph import audio_graph
-from harness.objectfile.graph import Encoding, Normaliser
+from harness.objectfile.audio.part import network_tensors
 from harness.objectfile.published.look import osf_tensors
 from harness.picture.srgb import bytes_from_linear
 from harness.sim.gel.presses import Presses
@@ -58,27 +59,92 @@ _RIDGE = 1e-6
 """Of the mean square of the features."""
 
 
+def encoded_width(inputs: int, octaves: int) -> int:
+    """Numbers that an input of that many becomes."""
+    return inputs * (1 + 2 * octaves)
+
+
+def encode(rows: FloatArray, octaves: int) -> Tensor:
+    """Encode normalised rows as ``[v, sin v, cos v, sin 2v, cos 2v, ...]``, in float32."""
+    place = np.float32(rows)
+    angles = [np.float32(2.0**k) * place for k in range(octaves)]
+    parts = [place, *(wave for angle in angles for wave in (np.sin(angle), np.cos(angle)))]
+    return torch.from_numpy(np.concatenate(parts, axis=1))
+
+
+def dense_layers(
+    encoded: int, outputs: int, depth: int, width: int, skip: int, random: np.random.Generator
+) -> nn.ModuleList:
+    """Linear layers that take an encoded input: hidden ones, and the last.
+
+    Weights are normal of variance ``2 / inputs`` (He et al., Delving deep into rectifiers, ICCV 2015),
+    biases zero.
+
+    Args:
+        encoded: numbers of the encoded input.
+        outputs: of the last layer.
+        depth: hidden layers.
+        width: of each.
+        skip: the layer, counted from 0, that takes the encoded input too; 0 for none.
+        random: draws the weights.
+    """
+    layers = nn.ModuleList()
+    given = encoded
+    for index in range(depth + 1):
+        taken = given + (encoded if index and index == skip else 0)
+        given = width if index < depth else outputs
+        layer = nn.Linear(taken, given)
+        weight = random.standard_normal((given, taken)) * np.sqrt(2.0 / taken)
+        with torch.no_grad():
+            layer.weight.copy_(torch.from_numpy(np.float32(weight)))
+            layer.bias.zero_()
+        layers.append(layer)
+    return layers
+
+
+def set_rate(adam: torch.optim.Adam, first: float, share: float) -> None:
+    """Let the rate fall from its first to zero as half a cosine; ``share`` of the training is over."""
+    for group in adam.param_groups:
+        group["lr"] = 0.5 * first * (1.0 + np.cos(np.pi * share))
+
+
 class EncodedPerceptron(nn.Module):
-    """``(k, inputs)`` normalised to ``(k, outputs)``: ReLU after every layer but the last."""
+    """``(k, encoded)`` to ``(k, outputs)``: ReLU after every layer but the last."""
 
-    def __init__(self, spec: FitSpec, inputs: int, outputs: int, seed: int) -> None:
+    def __init__(self, spec: FitSpec, inputs: int, outputs: int, random: np.random.Generator) -> None:
         super().__init__()
-        self._encoding = Encoding.octaves(spec.octaves)
-        self._as_it_is = Normaliser(np.zeros(inputs), np.ones(inputs))
-        random = np.random.default_rng([seed, 4])
-        width = self._encoding.width(inputs)
-        self.layers = dense_layers(width, outputs, spec.depth, spec.width, 0, random)
+        self.spec, self._sizes = spec, (encoded_width(inputs, spec.octaves), outputs)
+        self.layers = dense_layers(*self._sizes, spec.depth, spec.width, spec.skip, random)
 
-    def forward(self, rows: FloatArray) -> Tensor:
-        """Of normalised rows, which are encoded as the graph encodes them."""
-        return self.layers[-1](self.features(rows))
+    def forward(self, encoded: Tensor) -> Tensor:
+        """Outputs of encoded rows."""
+        return self.layers[-1](self.features(encoded))
 
-    def features(self, rows: FloatArray) -> Tensor:
+    def features(self, encoded: Tensor) -> Tensor:
         """``(k, width)``: what the last layer takes."""
-        hidden = encode(rows, self._as_it_is, self._encoding)
-        for layer in self.layers[:-1]:
-            hidden = torch.relu(layer(hidden))
+        hidden = encoded
+        for index, layer in enumerate(self.layers[:-1]):
+            taken = torch.cat([encoded, hidden], dim=1) if index and index == self.spec.skip else hidden
+            hidden = torch.relu(layer(taken))
         return hidden
+
+    def set_last(self, weight: AnyArray, bias: AnyArray) -> None:
+        """Replace the last layer by ``(in, out)`` and ``(out,)``."""
+        last = self.layers[-1]
+        assert isinstance(last, nn.Linear)
+        with torch.no_grad():
+            last.weight.copy_(torch.from_numpy(np.float32(weight.T)))
+            last.bias.copy_(torch.from_numpy(np.float32(bias)))
+
+    def to_published(self) -> SkipPerceptron:
+        """Convert to the published layout."""
+        encoded, outputs = self._sizes
+        spec, last = self.spec, self.layers[-1]
+        assert isinstance(last, nn.Linear)
+        perceptron = SkipPerceptron(encoded, spec.width, outputs, spec.depth, spec.skip or None)
+        perceptron.pts_linears = nn.ModuleList(self.layers[:-1])
+        perceptron.output_linear = last
+        return perceptron
 
 
 def fitted(
@@ -88,6 +154,7 @@ def fitted(
     seed: int,
     report: Callable[[float], None],
     scale: float = 1.0,
+    solve: bool = True,
 ) -> ScaledPerceptrons:
     """Train a network, then solve its last layer for what those before it give.
 
@@ -98,29 +165,25 @@ def fitted(
         seed: of first weights and of what is drawn.
         report: takes the share of the steps that is done.
         scale: factor of the trained outputs.
+        solve: whether to solve the last layer, or leave it as it is trained.
     """
     torch.set_num_threads(1)
-    network = EncodedPerceptron(spec, *sizes, seed)
+    network = EncodedPerceptron(spec, *sizes, np.random.default_rng([seed, 4]))
     adam = torch.optim.Adam(network.parameters(), lr=spec.rate)
     random = np.random.default_rng([seed, 5])
     for step in range(spec.steps):
         set_rate(adam, spec.rate, step / spec.steps)
         rows, wanted, _ = draw(random)
         adam.zero_grad()
-        loss = ((network(rows) - torch.from_numpy(np.float32(wanted))) ** 2).mean()
+        found = network(encode(rows, spec.octaves))
+        loss = ((found - torch.from_numpy(np.float32(wanted))) ** 2).mean()
         torch.autograd.backward(loss)
         adam.step()
         report((step + 1) / spec.steps)
-    perceptron = SkipPerceptron(
-        Encoding.octaves(spec.octaves).width(sizes[0]), spec.width, sizes[1], spec.depth, None
-    )
-    perceptron.pts_linears = nn.ModuleList(network.layers[:-1])
-    weight, bias = _solved(network, draw, random)
-    with torch.no_grad():
-        perceptron.output_linear.weight.copy_(torch.from_numpy(np.float32(weight.T)))
-        perceptron.output_linear.bias.copy_(torch.from_numpy(np.float32(bias)))
+    if solve:
+        network.set_last(*_solved(network, draw, random))
     plain, scales = (np.zeros(sizes[0]), np.ones(sizes[0])), (np.full((1, 1), scale), np.zeros((1, 1)))
-    return ScaledPerceptrons([perceptron], *plain, *scales, spec.octaves)
+    return ScaledPerceptrons([network.to_published()], *plain, *scales, spec.octaves)
 
 
 def _solved(
@@ -132,7 +195,7 @@ def _solved(
     for _ in range(_SOLVED):
         rows, wanted, weights = draw(random)
         with torch.no_grad():
-            found = network.features(rows).numpy().astype(np.float64)
+            found = network.features(encode(rows, network.spec.octaves)).numpy().astype(np.float64)
         features = np.concatenate([found, np.ones((len(found), 1))], axis=1)
         weighted = features * weights[:, None]
         products, targets = products + weighted.T @ features, targets + weighted.T @ wanted
@@ -230,7 +293,6 @@ def train_colours(bench: TouchBench, spec: FitSpec, report: Report) -> bytes:
 
 
 FIELD_SEED = 0
-_AS_IT_IS = Normaliser(np.zeros(3), np.ones(3))
 _STRETCH = 1.2
 _SPACE = 1 << 18
 """Places of the ball that are drawn, within the object and outside."""
@@ -245,15 +307,15 @@ class OsfField(nn.Module):
     def __init__(self, spec: FieldSpec) -> None:
         super().__init__()
         random = np.random.default_rng([FIELD_SEED, 4])
-        self._places, self._turns = Encoding.octaves(spec.octaves), Encoding.octaves(spec.turns)
-        width, turned = spec.width, self._turns.width(3)
-        self.trunk = dense_layers(self._places.width(3), width + 1, spec.depth, width, 0, random)
+        self._octaves, self._turns = spec.octaves, spec.turns
+        width, turned = spec.width, encoded_width(3, spec.turns)
+        self.trunk = dense_layers(encoded_width(3, spec.octaves), width + 1, spec.depth, width, 0, random)
         self.direction, self.colour = dense_layers(width + 2 * turned, 3, 1, width // 2, 0, random)
 
     def forward(self, points: FloatArray, views: FloatArray, lights: FloatArray) -> tuple[Tensor, Tensor]:
         """``(n, 3)`` and ``(n,)``."""
         both = self._hidden(points)
-        directions = [encode(each, _AS_IT_IS, self._turns) for each in (views, lights)]
+        directions = [encode(each, self._turns) for each in (views, lights)]
         hidden = torch.relu(self.direction(torch.cat([both[:, :-1], *directions], dim=1)))
         return self.colour(hidden), both[:, -1]
 
@@ -262,7 +324,7 @@ class OsfField(nn.Module):
         return self._hidden(points)[:, -1]
 
     def _hidden(self, points: FloatArray) -> Tensor:
-        hidden = encode(points, _AS_IT_IS, self._places)
+        hidden = encode(points, self._octaves)
         for number, layer in enumerate(self.trunk):
             hidden = layer(hidden)
             if number < len(self.trunk) - 1:
@@ -341,22 +403,105 @@ def _loss(network: OsfField, rows: FieldRows, spec: FieldSpec, random: np.random
     return (wrong * weight).mean() + spec.opacity * entropy
 
 
-def train_audionet(bench: StrikeBench, spec: PerceptronSpec, report: Report) -> bytes:
-    """The graph of 2.0's AudioNet, trained at the nodes that strikes are not at."""
-    training = AudioTraining(spec, bench.modes, bench.split.trained, STRIKE_SEED)
-    _trained(training, spec.epochs, report)
-    found = training.finish()
-    return audio_graph(found.branches, found.normaliser, found.scales, found.encoding).SerializeToString()
+_CHUNK = 4096
+"""Places of which the features of the last layer are computed at once."""
 
 
-def train_touchnet(bench: TouchBench, spec: TouchPerceptronSpec, report: Report) -> bytes:
-    """The graph of 2.0's TouchNet, trained on presses at other places than the bench's."""
-    training = TouchTraining(spec, learned_from(bench.places, spec.presses, STRIKE_SEED), STRIKE_SEED)
-    _trained(training, spec.epochs, report)
-    return training.finish().graph.SerializeToString()
+def train_audionet(bench: StrikeBench, spec: FitSpec, report: Report) -> bytes:
+    """The graph of 2.0's AudioNet, trained at the nodes that strikes are not at.
 
-
-def _trained(training: Resumable, epochs: int, report: Report) -> None:
+    Three perceptrons, for forces along x, y and z, learn together with the squared relative error, at nodes
+    and between them. Their last layers are then solved for what those before them give.
+    """
     torch.set_num_threads(1)
-    with TemporaryDirectory() as folder:
-        train(training, epochs, Path(folder) / "training.npz", report)
+    modes, trained = bench.modes, bench.split.trained
+    random = np.random.default_rng([STRIKE_SEED, 4])
+    branches = [EncodedPerceptron(spec, 3, len(modes.frequencies), random) for _ in range(3)]
+    low, high = modes.points.min(axis=0), modes.points.max(axis=0)
+    shift, factor = low, 1.0 / (high - low)
+
+    def encoded(points: FloatArray) -> Tensor:
+        return encode((points - shift) * factor, spec.octaves)
+
+    nodes, wanted = modes.points[trained], modes.shapes[trained]
+    levels = np.sqrt((wanted**2).mean(axis=0))
+    levels[levels == 0.0] = 1.0
+    scales = torch.from_numpy(np.float32(levels))
+    allowed = np.zeros(len(modes.points), dtype=np.bool_)
+    allowed[trained] = True
+    adam = torch.optim.Adam([each for branch in branches for each in branch.parameters()], lr=spec.rate)
+    for epoch in range(AUDIONET_EPOCHS):
+        extra = between_nodes(modes, allowed, 1, STRIKE_SEED + 1000 * epoch)
+        points, shapes = np.concatenate([nodes, extra.points]), np.concatenate([wanted, extra.shapes])
+        shares = error_shares(shapes.reshape(len(shapes), -1))
+        order = np.random.default_rng([STRIKE_SEED, 5, epoch]).permutation(len(points))
+        batches = np.array_split(order, max(1, len(order) // spec.batch))
+        for number, batch in enumerate(batches):
+            set_rate(adam, spec.rate, (epoch + number / len(batches)) / AUDIONET_EPOCHS)
+            targets = torch.from_numpy(np.float32(shapes[batch] * shares[batch, None, None]))
+            weights = scales * torch.from_numpy(np.float32(shares[batch]))[:, None, None]
+            adam.zero_grad()
+            rows = encoded(points[batch])
+            wrong = torch.stack([branch(rows) for branch in branches], dim=2) * weights - targets
+            torch.autograd.backward((wrong**2).sum(dim=(1, 2)).mean())
+            adam.step()
+        report("audio: training 2.0's network", (epoch + 1) / AUDIONET_EPOCHS)
+    shares = error_shares(wanted.reshape(len(wanted), -1))
+    for axis, branch in enumerate(branches):
+
+        def features(points: FloatArray, branch: EncodedPerceptron = branch) -> AnyArray:
+            starts = range(0, len(points), _CHUNK)
+            with torch.no_grad():
+                found = [branch.features(encoded(points[at : at + _CHUNK])).numpy() for at in starts]
+            return np.concatenate([np.concatenate(found), np.ones((len(points), 1), np.float32)], axis=1)
+
+        solved = solve_readout(features, nodes, wanted[:, :, axis], np.arange(len(nodes)), shares).weights
+        branch.set_last(solved[:-1], solved[-1])
+    plain = np.ones((3, 1)), np.zeros((3, 1))
+    network = ScaledPerceptrons(
+        [branch.to_published() for branch in branches], shift, factor, *plain, spec.octaves
+    )
+    taken, given = network_tensors(len(modes.frequencies), ANYWHERE)
+    doc = "A place to the shapes of the modes there, as in 2.0."
+    return exported_graph(network, (taken,), (given,), doc).SerializeToString()
+
+
+class PressRows:
+    """Pixels of possible presses at the places to learn from, drawn at random."""
+
+    def __init__(self, bench: TouchBench, batch: int) -> None:
+        self._batch, places = batch, bench.places
+        normals = smooth_normals(places.mesh, places.nodes.points)
+        at = np.random.default_rng([NETWORK_SEED, 9]).integers(len(places.nodes), size=TOUCHNET_PRESSES)
+        drawn = pressed(places.nodes.points[at], normals[at], NETWORK_SEED + 3)
+        flat = Presses(
+            drawn.points, drawn.normals, drawn.depths, drawn.tilts, drawn.azimuths, np.zeros(len(drawn))
+        )
+        reference = reference_maps(places.raster, flat, places.sensor, places.skirt)
+        possible = np.flatnonzero(reference.possible)
+        self._presses, self._inputs = flat[possible], PressInputs.of(places)
+        self._maps = reference.maps[possible].reshape(len(possible), -1).astype(np.float32)
+        self._scale = np.float32(places.sensor.gel_thickness)
+
+    def __call__(self, random: np.random.Generator) -> tuple[FloatArray, AnyArray, AnyArray]:
+        """``(batch, 9)`` inputs, ``(batch, 1)`` depths in thicknesses of the gel, and even weights."""
+        which = random.integers(len(self._maps), size=self._batch)
+        pixel = random.integers(self._maps.shape[1], size=self._batch)
+        rows = self._inputs.rows(self._presses[which], pixel)
+        return rows, (self._maps[which, pixel] / self._scale)[:, None], np.ones(self._batch)
+
+
+def train_touchnet(bench: TouchBench, spec: FitSpec, report: Report) -> bytes:
+    """The graph of 2.0's TouchNet, trained on presses at other places than the bench's."""
+    network = fitted(
+        spec,
+        (PRESS_INPUTS, 1),
+        PressRows(bench, spec.batch),
+        NETWORK_SEED,
+        lambda share: report("touch: training 2.0's network", share),
+        bench.places.sensor.gel_thickness,
+        solve=False,
+    )
+    taken, given = touchnet_pair()
+    doc = "A pixel of a press to the gel's indentation there, as in 2.0."
+    return exported_graph(network, (taken,), (given,), doc).SerializeToString()

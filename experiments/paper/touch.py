@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass
 from functools import cached_property
-from typing import Final, Literal
+from typing import Final, Literal, Self
 
 import numpy as np
 
@@ -33,9 +33,9 @@ from harness.authoring.touch.data import (
     smooth_normals,
 )
 from harness.authoring.touch.metrics import PressBench
-from harness.authoring.touch.profiles import TOUCH_PROFILES, CodesSpec, TouchPerceptronSpec
+from harness.authoring.touch.profiles import TOUCH_PROFILES, CodesSpec
 from harness.authoring.touch.touch import opened_codes, spaced_codes
-from harness.basics.arrays import AnyArray, ByteArray, FloatArray
+from harness.basics.arrays import AnyArray, ByteArray, FloatArray, IntArray
 from harness.basics.errors import OutOfDomain
 from harness.basics.mesh import Mesh
 from harness.basics.store import digest
@@ -47,9 +47,7 @@ from harness.objectfile.runtime import Network
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.touch.graph import codes_graph
 from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes
-from harness.objectfile.touch.part import PERCEPTRON, perceptron_tensors
-from harness.objectfile.touch.perceptron import pixel_domain
-from harness.objectfile.touch.touch import Maps, PerceptronMaps, ReferenceMaps, open_touch
+from harness.objectfile.touch.touch import Maps, ReferenceMaps, open_touch
 from harness.objectfile.touch_entries import GelEntry
 from harness.objectfile.vision_tensors import graph_input
 from harness.sim.gel.height_map import RasterMesh
@@ -60,14 +58,20 @@ from harness.sim.optics.tactile_calibration import TactileCalibration, shipped_c
 COLOURS: Final = FitSpec(octaves=6, steps=200)
 """1.0's TouchNet: 4 layers of 256, and 6 octaves for its 10, of which the last are noise between places."""
 
-TOUCHNET: Final = TouchPerceptronSpec(presses=1200, epochs=1, steps=150, rate=2e-3)
-"""2.0's, with the published layers."""
+TOUCHNET: Final = FitSpec(depth=8, skip=5, steps=150, batch=4096)
+"""2.0's TouchNet, with the published layers."""
+
+TOUCHNET_PRESSES: Final = 1200
+"""Presses whose maps 2.0's network learns from; those that are impossible are left out."""
 
 SMALL_CODES: Final = CodesSpec(most_bytes=1_000_000, pitch=0.8e-3)
 """Ours, smaller than the profile ``smoke``."""
 
 PRESS_SEED = 11
-"""Of places and presses; networks are made with 0."""
+"""Of places and presses."""
+
+NETWORK_SEED = 0
+"""Of codes and of 2.0's network."""
 
 SPACING = 5e-3
 """m between places that networks of the table may learn from."""
@@ -212,7 +216,56 @@ def colours_pair() -> tuple[Input, Tensor]:
     return place, colours
 
 
-_CODES_SEED = 0
+PRESS_INPUTS = 9
+TOUCHNET_FILE = "touch_perceptron.onnx"
+
+
+@dataclass(frozen=True, eq=False)
+class PressInputs:
+    """The inputs of 2.0's network (ObjectFolder 2.0, Gao et al., CVPR 2022, section 4.3).
+
+    Place, tilt, cosine and sine of its azimuth, depth, row and column, each from 0 to 1 but for cosine and
+    sine. There is no yaw among them.
+    """
+
+    least: FloatArray  #: ``(9,)`` that becomes 0: m, rad and pixels.
+    factor: FloatArray  #: ``(9,)`` one over the range.
+    columns: int  #: of the gel.
+
+    @classmethod
+    def of(cls, places: PressBench) -> Self:
+        """The inputs of an object's presses."""
+        low, high = places.mesh.bounds
+        sensor = places.sensor
+        least = np.array([*low, 0.0, 0.0, 0.0, DEPTHS[0], 0.0, 0.0])
+        most = np.array([*high, MOST_TILT, 1.0, 1.0, DEPTHS[1], sensor.rows - 1.0, sensor.columns - 1.0])
+        return cls(least, 1.0 / (most - least), sensor.columns)
+
+    def rows(self, presses: Presses, pixels: IntArray) -> FloatArray:
+        """``(k, 9)``, of ``(k,)`` pixels, counted row by row, each of its own press or all of one."""
+        rows = np.empty((len(pixels), PRESS_INPUTS))
+        rows[:, :3], rows[:, 3] = presses.points, presses.tilts
+        rows[:, 4], rows[:, 5] = np.cos(presses.azimuths), np.sin(presses.azimuths)
+        rows[:, 6] = presses.depths
+        rows[:, 7], rows[:, 8] = np.divmod(pixels, self.columns)
+        return (rows - self.least) * self.factor
+
+
+def touchnet_pair() -> tuple[Input, Tensor]:
+    """What the network takes and gives."""
+    box = Domain(low=(0.0,) * 4 + (-1.0,) * 2 + (0.0,) * 3, high=(1.0,) * PRESS_INPUTS)
+    meaning = "place x y z, tilt, cosine and sine of its azimuth, depth, row, column"
+    pixel = graph_input("pixel", "float64", ("n", PRESS_INPUTS), "1", meaning, box)
+    depth = Tensor(
+        name="depth",
+        dtype="float32",
+        shape=("n", 1),
+        unit="m",
+        meaning="how far the gel is pressed in",
+    )
+    return pixel, depth
+
+
 _REACH = 2.0
 """Spacings that a press may be from a code: more than an ObjectFile allows, so that no press is refused."""
 
@@ -230,6 +283,14 @@ def first_touch(bench: TouchBench, work: RenderingWork, suffix: str = "") -> Ren
     return RenderingMethod(
         f"DIGIT-like TouchNet (1.0){suffix}", column, astuple(COLOURS), lambda: _by_colours(bench, work), note
     )  # fmt: skip
+
+
+def second_touch(bench: TouchBench, work: RenderingWork) -> RenderingMethod:
+    """2.0's network."""
+    note = f"its layers; trained here for {TOUCHNET.steps} steps alone"
+    return RenderingMethod(
+        "TouchNet (2.0)", "2.0 here", astuple(TOUCHNET), lambda: _by_touchnet(bench, work), note
+    )
 
 
 def untouched(bench: TouchBench, suffix: str = "") -> RenderingMethod:
@@ -251,13 +312,7 @@ def touch_methods(bench: TouchBench, of: ObjectFile, work: RenderingWork) -> lis
     return [
         untouched(bench),
         first_touch(bench, work),
-        RenderingMethod(
-            "TouchNet (2.0)",
-            "2.0 here",
-            astuple(TOUCHNET),
-            lambda: _by_touchnet(bench, work),
-            f"its layers; trained here for {TOUCHNET.epochs * TOUCHNET.steps} steps alone",
-        ),
+        second_touch(bench, work),
         _codes("codes of 1 MB", SMALL_CODES, "ours, smallest", bench),
         *_own(bench, of),
         _codes("codes of 18 MB, profile standard", largest, "ours, largest", bench),
@@ -291,7 +346,7 @@ def _codes(name: str, spec: CodesSpec, column: Column, bench: TouchBench) -> Ren
 
 def _by_codes(bench: TouchBench, spec: CodesSpec) -> MadeMethod:
     places, begun = bench.places, time.process_time()
-    coded, spacing = spaced_codes(places.raster, places.sensor, spec, _CODES_SEED)
+    coded, spacing = spaced_codes(places.raster, places.sensor, spec, NETWORK_SEED)
     graph = codes_graph(coded.patches, places.sensor, places.skirt)
     maps = opened_codes(graph, coded.nodes, _REACH * spacing, places.sensor)
     return MadeMethod(_drawn(bench, maps), time.process_time() - begun)
@@ -303,12 +358,17 @@ def _by_touchnet(bench: TouchBench, work: RenderingWork) -> MadeMethod:
 
         return train_touchnet(bench, TOUCHNET, work.report)
 
-    data, seconds = stored_graph(work.store, ("touchnet", bench.lesson, astuple(TOUCHNET)), "TouchNet", train)
-    places = bench.places
-    low, high = places.mesh.bounds
-    least, most = pixel_domain(low, high, DEPTHS, MOST_TILT, places.sensor)
-    network = Network(data, PERCEPTRON, *perceptron_tensors(least, most))
-    return MadeMethod(_drawn(bench, PerceptronMaps(network, _gel(bench))), seconds)
+    identity = ("touchnet", bench.lesson, astuple(TOUCHNET), TOUCHNET_PRESSES)
+    data, seconds = stored_graph(work.store, identity, "TouchNet", train)
+    pixel, depth = touchnet_pair()
+    network = Network(data, TOUCHNET_FILE, [pixel], [depth])
+    inputs, shape = PressInputs.of(bench.places), bench.maps.shape[1:]
+    pixels = np.arange(bench.maps[0].size)
+
+    def maps(presses: Presses) -> AnyArray:
+        return network({"pixel": inputs.rows(presses, pixels)})["depth"].reshape(1, *shape)
+
+    return MadeMethod(_drawn(bench, maps), seconds)
 
 
 def _by_colours(bench: TouchBench, work: RenderingWork) -> MadeMethod:
@@ -328,11 +388,8 @@ def _by_colours(bench: TouchBench, work: RenderingWork) -> MadeMethod:
 
 
 def _reference(bench: TouchBench) -> MadeMethod:
-    return MadeMethod(_drawn(bench, ReferenceMaps(bench.places.raster, _gel(bench))))
-
-
-def _gel(bench: TouchBench) -> GelEntry:
-    return GelEntry.of(bench.places.sensor, bench.places.skirt)
+    gel = GelEntry.of(bench.places.sensor, bench.places.skirt)
+    return MadeMethod(_drawn(bench, ReferenceMaps(bench.places.raster, gel)))
 
 
 def _drawn(bench: TouchBench, maps: Maps) -> Render:

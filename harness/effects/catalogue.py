@@ -22,7 +22,7 @@ from harness.effects.effect import Condition, Effect
 from harness.effects.force_effects import FORCE_EFFECT
 from harness.effects.sound_effects import SOUND_EFFECTS
 from harness.effects.touch_drawing import optics, reached
-from harness.effects.touch_file_effects import FILE_EFFECTS, SHAPES, gel_from
+from harness.effects.touch_file_effects import FILE_EFFECTS, GEL_FROM_CODES, SHAPES
 from harness.sim.gel.gel import deform, over_range
 from harness.sim.gel.height_map import RasterMesh
 from harness.sim.gel.markers import draw_markers, marker_displacements
@@ -135,7 +135,7 @@ EFFECTS = (
         _gel,
         knobs=(GEL,),
         choice=SHAPES,
-        ways={"network": gel_from("codes"), "perceptron": gel_from("perceptron")},
+        ways={"network": GEL_FROM_CODES},
     ),
     Effect("touch.colour", ("touch.gel", "sensor", "sensor.calibration"), _colour, knobs=(OPTICS,)),
     Effect(

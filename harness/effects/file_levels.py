@@ -30,10 +30,7 @@ def senses_of(scene: SceneFile) -> tuple[Modality, ...]:
 
 
 def networks_of(of: Description) -> frozenset[Modality]:
-    """The senses that an ObjectFile has a network of, which stands for the simulation.
-
-    A perceptron of touch answers single presses and no yaw, and is taken only where it is asked for.
-    """
+    """The senses that an ObjectFile has a network of, which stands for the simulation."""
     has: dict[Modality, bool] = {
         "audio": of.audio is not None and of.audio.network is not None,
         "touch": of.touch is not None and of.touch.codes is not None,

@@ -1,4 +1,4 @@
-"""The touch of an ObjectFile in a scene: levels of the gel's surface beside rasteriser and skirt.
+"""The touch of an ObjectFile in a scene: a level of the gel's surface beside rasteriser and skirt.
 
 Sources, beside those of the touch: ``object.file`` (the object's ``ObjectFile``) and ``object.wall`` (m, or
 None for a mesh of the material itself); asked for only where the gel's surface comes from the file. Its
@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from harness.basics.arrays import FloatArray
 from harness.effects.accuracy import Knob, Level
-from harness.effects.effect import Compute, Effect, Implementation
+from harness.effects.effect import Effect, Implementation
 from harness.effects.sound_effects import NAMED
 from harness.sim.solid.walls import walled
 
 if TYPE_CHECKING:
-    from harness.objectfile.touch.touch import ObjectTouch, TouchLevel
+    from harness.objectfile.touch.touch import ObjectTouch
     from harness.sim.gel.presses import Presses
 
 Given = Mapping[str, Any]
@@ -24,11 +24,12 @@ Levels = Mapping[str, Level]
 
 SHAPES = Knob(
     "touch.shapes",
-    ("perceptron", "network", "reference"),
+    ("network", "reference"),
     "",
     "method",
     "reference",
-    "the ObjectFile's perceptron, its network of codes, or the rasteriser on the mesh",
+    "the ObjectFile's network of codes, or the rasteriser on the mesh",
+    removed={"perceptron": "network"},
 )
 
 _NEEDS = ("object.file", "object.mesh", "object.wall", "sensor", "sensor.calibration")
@@ -40,31 +41,24 @@ def _presses(given: Given, _levels: Levels) -> "Presses":
     return presses_of(given["object.mesh"], given["contact.gel_from_object"])
 
 
-def _opened(level: "TouchLevel") -> Compute:
-    def compute(given: Given, _levels: Levels) -> "ObjectTouch":
-        # Loaded by those alone who take touch from an ObjectFile.
-        from harness.objectfile.touch.level import touch_from
+def _codes(given: Given, _levels: Levels) -> "ObjectTouch":
+    # Loaded by those alone who take touch from an ObjectFile.
+    from harness.objectfile.touch.level import touch_from
 
-        solid = walled(given["object.mesh"], given["object.wall"])
-        skirt = given["sensor.calibration"].header.skirt
-        return touch_from(given["object.file"], level, solid, given["sensor"], skirt)
-
-    return compute
+    solid = walled(given["object.mesh"], given["object.wall"])
+    skirt = given["sensor.calibration"].header.skirt
+    return touch_from(given["object.file"], solid, given["sensor"], skirt)
 
 
-def gel_from(level: "TouchLevel") -> Implementation:
-    """How ``touch.gel`` comes from a level of the ObjectFile."""
-    opened = f"object.touch_{level}"
+def _gel(given: Given, _levels: Levels) -> FloatArray:
+    surface: FloatArray = given["object.touch_codes"].at(given["contact.presses"])
+    return surface
 
-    def compute(given: Given, _levels: Levels) -> FloatArray:
-        surface: FloatArray = given[opened].at(given["contact.presses"])
-        return surface
 
-    return Implementation((opened, "contact.presses"), compute, when=NAMED)
-
+GEL_FROM_CODES = Implementation(("object.touch_codes", "contact.presses"), _gel, when=NAMED)
+"""``touch.gel`` from the codes of an ObjectFile."""
 
 FILE_EFFECTS = (
     Effect("contact.presses", ("object.mesh", "contact.gel_from_object"), _presses),
-    Effect("object.touch_codes", _NEEDS, _opened("codes"), when=NAMED),
-    Effect("object.touch_perceptron", _NEEDS, _opened("perceptron"), when=NAMED),
+    Effect("object.touch_codes", _NEEDS, _codes, when=NAMED),
 )

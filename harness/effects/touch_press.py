@@ -105,11 +105,8 @@ class Press:
     @property
     def maps_measured(self) -> dict[str, float] | None:
         """Errors that an ObjectFile claims for the network that gave the gel's surface; None without one."""
-        for level in ("codes", "perceptron"):
-            opened = self.evaluation.values.get(f"object.touch_{level}")
-            if opened is not None:
-                return dict(opened.measured)
-        return None
+        opened = self.evaluation.values.get("object.touch_codes")
+        return None if opened is None else dict(opened.measured)
 
     @property
     def force(self) -> ContactForce | None:

@@ -62,9 +62,9 @@ class Description(Entry):
     def networks(self) -> Mapping[str, NetworkEntry]:
         """By modality, those that there are."""
         audio = None if self.audio is None else self.audio.network
-        touch = {} if self.touch is None else self.touch.networks
+        codes = None if self.touch is None else self.touch.codes
         vision = None if self.vision is None else self.vision.network
-        every = {"audio": audio, **touch, "vision": vision}
+        every = {"audio": audio, "touch": None if codes is None else codes.network, "vision": vision}
         return {name: entry for name, entry in every.items() if entry is not None}
 
     @model_validator(mode="after")

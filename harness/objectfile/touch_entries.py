@@ -13,9 +13,6 @@ from harness.sim.gel.gel import GelSkirt
 Positive = Annotated[float, Field(gt=0.0)]
 Size = Annotated[int, Field(ge=1)]
 
-Tensors = list[tuple[str, str, tuple[int | str, ...]]]
-"""Name, type and shape of each."""
-
 MAP_RANGE = 2e-3
 """m that the decibels of a model card are of: the deepest press that errors are measured on."""
 
@@ -99,14 +96,14 @@ class CodesEntry(Entry):
 
 
 class TouchEntry(Entry):
-    """The object's touch: what may be queried, and one or two networks that answer."""
+    """The object's touch: what may be queried, and the codes that answer."""
 
     gel: GelEntry  #: that the maps are of.
     depth_m: tuple[Positive, Positive]  #: m, least and greatest depth of a press, but for codes.
     most_tilt_rad: Annotated[float, Field(gt=0.0, lt=1.5)]  #: rad, the greatest tilt, but for codes.
     near_surface_m: Positive  #: m, how far from the surface a contact may be.
-    codes: CodesEntry | None = None  #: network of the level ``codes``.
-    perceptron: NetworkEntry | None = None  #: network of the level ``perceptron``.
+    codes: CodesEntry | None = None  #: network of the level ``codes``; earlier versions could leave it out.
+    perceptron: NetworkEntry | None = None  #: network of ObjectFolder 2.0 of earlier versions; not rendered.
     provenance: Provenance  #: of the touch.
 
     sense: ClassVar[Modality] = "touch"
@@ -116,13 +113,6 @@ class TouchEntry(Entry):
         """All that the folder must hold for it."""
         codes = () if self.codes is None else (self.codes.network, self.codes.nodes)
         return codes if self.perceptron is None else (*codes, self.perceptron)
-
-    @property
-    def networks(self) -> dict[str, NetworkEntry]:
-        """Its graphs, by the name of the level."""
-        codes = None if self.codes is None else self.codes.network
-        every = {"touch": codes, "touch perceptron": self.perceptron}
-        return {name: entry for name, entry in every.items() if entry is not None}
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -134,31 +124,16 @@ class TouchEntry(Entry):
             )
         image = ("n", self.gel.rows, self.gel.columns)
         if self.codes is not None:
-            taken = [("node", "int64", ("n", 1)), ("node_from_gel", "float64", ("n", 3, 4))]
+            inputs = [("node", "int64", ("n", 1)), ("node_from_gel", "float64", ("n", 3, 4))]
             every = self.gel.ray_pixels
             rays = ("n", self.gel.rows // every, self.gel.columns // every)
-            given: Tensors = [("maps", "float32", image), ("gaps", "float32", rays)]
-            _check(self.codes.network, taken, given, "codes")
-        if self.perceptron is not None:
-            _check(
-                self.perceptron,
-                [("pixel", "float64", ("n", 9))],
-                [("depth", "float32", ("n", 1))],
-                "perceptron",
-            )
+            outputs = [("maps", "float32", image), ("gaps", "float32", rays)]
+            network = self.codes.network
+            taken = [(tensor.name, tensor.dtype, tensor.shape) for tensor in network.inputs]
+            given = [(tensor.name, tensor.dtype, tensor.shape) for tensor in network.outputs]
+            if taken != inputs or given != outputs:
+                raise ValueError(
+                    f"its codes take {taken} and give {given}, where touch has {inputs} and {outputs}; build "
+                    "the touch again"
+                )
         return self
-
-
-def _check(
-    network: NetworkEntry,
-    inputs: Tensors,
-    outputs: Tensors,
-    what: str,
-) -> None:
-    taken = [(tensor.name, tensor.dtype, tensor.shape) for tensor in network.inputs]
-    given = [(tensor.name, tensor.dtype, tensor.shape) for tensor in network.outputs]
-    if taken != inputs or given != outputs:
-        raise ValueError(
-            f"its {what} take {taken} and give {given}, where touch has {inputs} and {outputs}; build the "
-            "touch again"
-        )

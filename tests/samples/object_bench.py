@@ -1,28 +1,26 @@
-"""A small object whose sound is known in closed form: its network is the truth, computed in float64."""
+"""A small object whose sound is known in closed form: its network is the truth."""
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
 
-from harness.basics.arrays import FloatArray
+from harness.authoring.audio.audio import waves_graph
+from harness.authoring.audio.waves import Waves
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
-from harness.objectfile.audio.graph import OutputScales, audio_graph
 from harness.objectfile.audio.part import AudioPart, with_audio
 from harness.objectfile.entries import Provenance
 from harness.objectfile.file import ObjectFile, create_object
-from harness.objectfile.graph import Encoding, MlpWeights, Normaliser
 from harness.objects.builtin import DESCRIPTION
 from harness.sim.modal.modes import Modes, dampings
 
 MODES = 7
 NEAR = 2e-3
-ENCODING = Encoding.octaves(4)
 PROVENANCE = Provenance(licence="CC0-1.0", seeds={"weights": 0}, code={"module": "tests.object_bench"})
 
 
@@ -32,64 +30,17 @@ def egg(subdivisions: int = 3) -> Mesh:
     return Mesh(ball.vertices * [0.03, 0.04, 0.05] + [0.11, -0.02, 0.05], ball.faces)
 
 
-def perceptron(
-    seed: int,
-    outputs: int,
-    width: int = 32,
-    depth: int = 3,
-    skips: tuple[int, ...] = (),
-    encoding: Encoding = ENCODING,
-) -> MlpWeights:
-    """Random layers that keep the size of what passes."""
-    random, layers, before = np.random.default_rng(seed), [], 0
-    for layer in range(depth + 1):
-        taken = before + (encoding.width(3) if layer == 0 or layer in skips else 0)
-        given = outputs if layer == depth else width
-        weight = random.normal(size=(taken, given)) * np.sqrt(2.0 / taken)
-        layers.append((weight, 0.1 * random.normal(size=given)))
-        before = given
-    return MlpWeights(tuple(layers), skips)
-
-
-def normaliser(mesh: Mesh) -> Normaliser:
-    """Of the mesh's box."""
-    return Normaliser.unit_box(mesh.bounds[0], mesh.bounds[1])
-
-
-def scales(modes: int = MODES) -> OutputScales:
-    """Another for each mode and direction, so that none can be taken for another."""
-    numbers = np.arange(1.0, 3.0 * modes + 1.0).reshape(modes, 3)
-    return OutputScales(numbers, -0.1 * numbers)
-
-
-def computed(
-    branches: Sequence[MlpWeights],
-    points: FloatArray,
-    normal: Normaliser,
-    scale: OutputScales,
-    encoding: Encoding = ENCODING,
-) -> FloatArray:
-    """``(n, m, 3)``: what the graph should give, by the definitions, in float64."""
-    inside = (points - normal.shift) * normal.factor
-    waves = [wave(rate * inside) for rate in encoding.frequencies for wave in (np.sin, np.cos)]
-    encoded = np.concatenate([inside, *waves], axis=1)
-    outputs = []
-    for branch in branches:
-        hidden = np.zeros((len(points), 0))
-        for number, (weight, bias) in enumerate(branch.layers):
-            if number == 0 or number in branch.skips:
-                hidden = np.concatenate([encoded, hidden], axis=1)
-            hidden = hidden @ weight + bias
-            if number < len(branch.layers) - 1:
-                hidden = np.maximum(hidden, 0.0)
-        outputs.append(hidden)
-    stacked = outputs[0].reshape(len(points), -1, 3) if len(outputs) == 1 else np.stack(outputs, axis=2)
-    return np.asarray(stacked * scale.factor + scale.offset)
+def egg_waves(seed: int = 0, modes: int = MODES) -> Waves:
+    """Random waves, whose weights are of another size for each mode and direction."""
+    random, sizes = np.random.default_rng(seed), np.arange(1.0, 3.0 * modes + 1.0)
+    middle = egg().bounds.mean(axis=0)
+    vectors, phases = random.normal(size=(3, 24)), random.uniform(0.0, 6.0, 24)
+    return Waves(middle, 20.0, 2.0 * vectors, phases, sizes * random.normal(size=(28, 3 * modes)))
 
 
 def egg_modes(mesh: Mesh) -> Modes:
     """The modes whose shapes the network of ``egg_part`` gives."""
-    shapes = computed([perceptron(0, 3 * MODES)], mesh.vertices, normaliser(mesh), scales())
+    shapes = egg_waves()(mesh.vertices)
     return Modes(
         frequencies=np.linspace(900.0, 9000.0, MODES),
         points=mesh.vertices,
@@ -114,7 +65,7 @@ def egg_part(mesh: Mesh) -> AudioPart:
         dampings=dampings(modes.frequencies, MATERIALS["ceramic"]),
         near_surface=NEAR,
         provenance=PROVENANCE,
-        graph=audio_graph([perceptron(0, 3 * MODES)], normaliser(mesh), scales(), ENCODING),
+        graph=waves_graph(egg_waves()),
         measured={"network": {"gain_error_median": 0.01}},
     )
 

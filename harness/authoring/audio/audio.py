@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from onnx import ModelProto, TensorProto, helper
@@ -18,22 +17,18 @@ from harness.authoring.audio.metrics import (
     relative_errors,
     sound_distances,
 )
-from harness.authoring.audio.profiles import AudioProfile, PerceptronSpec
+from harness.authoring.audio.profiles import AudioProfile
 from harness.authoring.audio.waves import Waves, fit_enough_waves
-from harness.authoring.training import Report, median_seconds, train
+from harness.authoring.training import Report, median_seconds
 from harness.basics.arrays import AnyArray, FloatArray
-from harness.objectfile.audio.graph import audio_graph
 from harness.objectfile.audio.part import NETWORK, network_tensors
 from harness.objectfile.audio.table import scaled
-from harness.objectfile.graph import Nodes, Normaliser, Storage
+from harness.objectfile.graph import Nodes, Storage
 from harness.objectfile.runtime import Network
 from harness.sim.modal.modes import Modes
 from harness.sim.modal.stage_seconds import timed
 from harness.sim.sound.modal_sound import audible
 from harness.sim.sound.synthesis import synthesize
-
-CHECKPOINT = ".audio_training.npz"
-"""Beside ``object.json`` until the training is over."""
 
 _TIMED = 200
 _CHUNK = 256
@@ -60,7 +55,6 @@ def author_audio(
     dampings: FloatArray,
     profile: AudioProfile,
     seed: int,
-    folder: Path,
     report: Report,
     threads: int = 1,
 ) -> AuthoredAudio:
@@ -70,45 +64,19 @@ def author_audio(
         modes: of the object, canonical (``audio_data.canonical``).
         dampings: ``(m,)`` 1/s.
         profile: which network.
-        seed: of the split, of first weights, of orders.
-        folder: where a checkpoint is kept; a training that was killed goes on from it.
+        seed: of the split and of the waves.
         report: told of progress.
-        threads: of a training; with one, a resumed training gives the same network bit for bit.
-
-    Raises:
-        DataRefused: a checkpoint in the folder that cannot be gone on from.
+        threads: of the fit.
     """
     split = split_nodes(len(modes.points), seed=seed)
     seconds: dict[str, float] = {}
     with timed(seconds, "train"), threadpool_limits(limits=threads, user_api="blas"):
-        graph, settings = _made(modes, split, profile, seed, folder, report, threads)
-    report("measuring", 0.0)
-    with timed(seconds, "measure"):
-        errors = measure_audio(modes, dampings, split, graph, profile.sounds)
-    return AuthoredAudio(graph, split, errors, settings, seconds)
-
-
-def _made(
-    modes: Modes, split: Split, profile: AudioProfile, seed: int, folder: Path, report: Report, threads: int
-) -> tuple[ModelProto, dict[str, str | float | int | bool | None]]:
-    spec = profile.network
-    if isinstance(spec, PerceptronSpec):
-        import torch
-
-        from harness.authoring.audio.mlp import AudioTraining
-
-        torch.set_num_threads(threads)
-        training = AudioTraining(spec, modes, split.trained, seed)
-        train(training, spec.epochs, folder / CHECKPOINT, report)
-        trained = training.finish()
-        graph = audio_graph(trained.branches, trained.normaliser, trained.scales, trained.encoding)
-        settings: dict[str, str | float | int | bool | None] = {"network": "perceptrons", **vars(spec)}
-        return graph, settings | {"last_loss": training.losses[-1]}
-    report("fitting waves", 0.0)
-    nodes = SoundSamples(modes.points[split.trained], modes.shapes[split.trained])
-    number = wave_number(modes)
-    fitted = fit_enough_waves(nodes, np.arange(len(nodes.points)), number, spec, seed)
-    return waves_graph(fitted.network, spec.storage), {
+        report("fitting waves", 0.0)
+        spec, number = profile.network, wave_number(modes)
+        nodes = SoundSamples(modes.points[split.trained], modes.shapes[split.trained])
+        fitted = fit_enough_waves(nodes, np.arange(len(nodes.points)), number, spec, seed)
+        graph = waves_graph(fitted.network, spec.storage)
+    settings: dict[str, str | float] = {
         "network": "waves",
         "width": len(fitted.network.phases),
         "wave_number_rad_per_m": number,
@@ -117,6 +85,10 @@ def _made(
         "storage": spec.storage,
         "expected_relative_error": fitted.readout.expected,
     }
+    report("measuring", 0.0)
+    with timed(seconds, "measure"):
+        errors = measure_audio(modes, dampings, split, graph, profile.sounds)
+    return AuthoredAudio(graph, split, errors, settings, seconds)
 
 
 def measure_audio(
@@ -185,7 +157,10 @@ def _sound_errors(
 
 
 def waves_graph(network: Waves, storage: Storage = "float32") -> ModelProto:
-    """Plane waves as a graph; its input and output are those of ``audio_graph``.
+    """Plane waves as a graph, from points in metres to the shapes of the modes there.
+
+    Points are float64: an object scanned far from its origin would lose the digits that tell its points apart
+    before they are normalised.
 
     Args:
         network: to write.
@@ -194,7 +169,9 @@ def waves_graph(network: Waves, storage: Storage = "float32") -> ModelProto:
     """
     modes = network.weights.shape[1] // 3
     nodes = Nodes(storage)
-    place = nodes.normalised("points", Normaliser(network.shift, np.full(3, network.factor)))
+    moved = nodes.add("Sub", "points", nodes.constant(np.asarray(network.shift, np.float64)))
+    normalised = nodes.add("Mul", moved, nodes.constant(np.full(3, network.factor, np.float64)))
+    place = nodes.add("Cast", normalised, to=TensorProto.FLOAT)
     vectors = nodes.constant(network.vectors.astype(np.float32))
     phases = nodes.constant(network.phases.astype(np.float32))
     waves = nodes.add("Sin", nodes.add("Gemm", place, vectors, phases))

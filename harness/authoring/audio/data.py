@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.errors import WrongUse
 from harness.sim.modal.modes import Modes
 
@@ -17,9 +17,6 @@ _FIELDS = 32
 
 _CHUNK = 4096
 """Edges at a time: all of them with all modes would not fit into memory."""
-
-_QUADRATIC_PARTS = 4
-"""Triangles that the surface of a ten-node cell's face is listed as."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,48 +124,3 @@ def wave_number(modes: Modes) -> float:
     levels = (modes.shapes**2).mean(axis=0)
     moving = levels > 0.0
     return float(np.quantile(np.sqrt(slopes[moving] / levels[moving]), 0.95))
-
-
-def between_nodes(modes: Modes, allowed: BoolArray, each: int, seed: int) -> SoundSamples:
-    """Random places between nodes, with the shapes that the elements give there.
-
-    Quadratic in each face of a ten-node cell where ``modes`` lists them as ``harness.sim.modal.modal`` does,
-    else linear in each triangle. Places and shapes of the curved face belong together.
-
-    Args:
-        modes: of the object.
-        allowed: ``(n,)``: nodes that may be shown; a face with any other gives nothing.
-        each: places in every face.
-        seed: of the places.
-    """
-    faces, quadratic = _elements(modes.faces)
-    faces = np.repeat(faces[allowed[faces].all(axis=1)], each, axis=0)
-    shares = np.random.default_rng([seed, 2]).dirichlet(np.ones(3), size=len(faces))
-    weights = _quadratic(shares) if quadratic else shares
-    points = np.einsum("kc,kcd->kd", weights, modes.points[faces])
-    shapes = np.zeros((len(faces), *modes.shapes.shape[1:]))
-    for node in range(faces.shape[1]):
-        shapes += weights[:, node, None, None] * modes.shapes[faces[:, node]]
-    return SoundSamples(points, shapes)
-
-
-def _elements(faces: IntArray) -> tuple[IntArray, bool]:
-    """``(f, 6)`` corners and middles, True; or the triangles themselves, False."""
-    count, rest = divmod(len(faces), _QUADRATIC_PARTS)
-    if rest or count == 0:
-        return faces, False
-    first, second, third, inner = faces.reshape(_QUADRATIC_PARTS, count, 3)
-    middles = (first[:, 1], second[:, 2], third[:, 0])
-    again = (second[:, 0], third[:, 1], first[:, 2])
-    same = [np.array_equal(inner[:, side], middles[side]) for side in range(3)]
-    if not all(same) or not all(map(np.array_equal, middles, again)):
-        return faces, False
-    corners = (first[:, 0], second[:, 1], third[:, 2])
-    return np.stack([*corners, *middles], axis=1), True
-
-
-def _quadratic(shares: FloatArray) -> FloatArray:
-    """Shape functions of a six-node triangle: corners, then middles of ab, bc, ca."""
-    a, b, c = shares.T
-    corners = [a * (2.0 * a - 1.0), b * (2.0 * b - 1.0), c * (2.0 * c - 1.0)]
-    return np.stack([*corners, 4.0 * a * b, 4.0 * b * c, 4.0 * c * a], axis=1)

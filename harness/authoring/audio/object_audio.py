@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.authoring.audio.audio import CHECKPOINT, AuthoredAudio, author_audio
+from harness.authoring.audio.audio import AuthoredAudio, author_audio
 from harness.authoring.audio.data import canonical
 from harness.authoring.audio.profiles import profile
 from harness.authoring.object_source import PartRequest, created_object, provenance_of, source_of
@@ -72,12 +72,12 @@ def build_audio(
         out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
         store: where modes are kept, so that a build that is begun again need not solve again.
         report: told of progress.
-        threads: of a training.
+        threads: of the fit.
 
     Raises:
         WrongUse: options that cannot be.
         MeshRefused: a mesh that cannot stand for an object, or none of whose modes is in reach.
-        DataRefused: a checkpoint or an ObjectFile in the folder that is of something else; or what was
+        DataRefused: an ObjectFile in the folder that is of something else; or what was
             written does not read back.
     """
     chosen = profile(wanted.profile)
@@ -89,7 +89,7 @@ def build_audio(
     rates = dampings(modes.frequencies, wanted.material)
     with timed(seconds, "export"):
         created = created_object(wanted.mesh, wanted.licence, wanted.material, mesh, out, source)
-    audio = author_audio(modes, rates, chosen, wanted.seed, out, report, threads)
+    audio = author_audio(modes, rates, chosen, wanted.seed, report, threads)
     seconds |= audio.seconds
     report("writing", 0.0)
     part = AudioPart(
@@ -103,7 +103,6 @@ def build_audio(
     )
     with timed(seconds, "export"):
         made = with_audio(created, part)
-    (out / CHECKPOINT).unlink(missing_ok=True)
     report("verifying what was written", 0.0)
     with timed(seconds, "verify"):
         _check(made)

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from harness.basics.errors import WrongUse
-from harness.basics.files.named_file import nearest
+from harness.authoring.profiles import find_profile
 from harness.objectfile.graph import Storage
 
 REACHES = (0.7, 1.0, 1.4)
@@ -23,40 +22,20 @@ class WavesSpec:
 
 
 @dataclass(frozen=True)
-class PerceptronSpec:
-    """Perceptrons trained by Adam; the defaults are the paper's."""
-
-    branches: int = 3  #: 3, one for each direction of force, or 1 for all.
-    depth: int = 8  #: hidden layers.
-    width: int = 256  #: of each.
-    octaves: int = 10  #: of the encoding.
-    skip: int = 5  #: the layer, counted from 0, that takes the encoded input too; 0 for none.
-    epochs: int = 60  #: passes over the samples.
-    batch: int = 256  #: samples in a step.
-    rate: float = 1e-3  #: of Adam's first steps; it falls to zero as half a cosine.
-
-
-@dataclass(frozen=True)
 class AudioProfile:
     """One trade of time for accuracy."""
 
-    network: WavesSpec | PerceptronSpec  #: that is made.
+    network: WavesSpec  #: that is made.
     sounds: int  #: held-out nodes whose sounds are compared.
     table: bool = True  #: whether the exact shapes are written beside the network.
 
-
-_SMALL = PerceptronSpec(branches=1, depth=4, width=256, octaves=6, skip=0, epochs=300)
 
 PROFILES: Mapping[str, AudioProfile] = MappingProxyType({
     "smoke": AudioProfile(WavesSpec(768, (1.0,)), sounds=8),
     "shipped": AudioProfile(WavesSpec(1536, storage="float16"), sounds=40, table=False),
     "standard": AudioProfile(WavesSpec(1536, widest=3072), sounds=40),
-    "small": AudioProfile(_SMALL, sounds=40),
-    "paper": AudioProfile(PerceptronSpec(epochs=120), sounds=40),
 })  # fmt: skip
-"""``smoke``, ``shipped`` and ``standard`` need no torch; ``shipped`` is ``standard`` in the fewest bytes, of
-the files that come with the program; ``paper`` is the network of ObjectFolder 2.0, ``small`` one
-trunk for all three directions."""
+"""``shipped`` is ``standard`` in the fewest bytes, of the files that come with the program."""
 
 
 def profile(name: str) -> AudioProfile:
@@ -65,7 +44,4 @@ def profile(name: str) -> AudioProfile:
     Raises:
         WrongUse: there is none.
     """
-    found = PROFILES.get(name)
-    if found is None:
-        raise WrongUse(f"no profile {name!r}; {nearest(name, PROFILES)}")
-    return found
+    return find_profile(PROFILES, name, "audio", removed=("small", "paper"))

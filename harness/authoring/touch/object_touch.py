@@ -1,4 +1,4 @@
-"""From a file to an ObjectFile with a touch: intake, codes, perceptron, measurement, writing."""
+"""From a file to an ObjectFile with a touch: intake, codes, measurement, writing."""
 
 import time
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from pathlib import Path
 from harness.authoring.object_source import PartRequest, created_object, provenance_of, source_of
 from harness.authoring.touch.data import DEPTHS, MOST_TILT
 from harness.authoring.touch.profiles import touch_profile
-from harness.authoring.touch.touch import CHECKPOINT, AuthoredTouch, author_touch
+from harness.authoring.touch.touch import AuthoredTouch, author_touch
 from harness.authoring.training import Report
 from harness.bench.sensor import GELSIGHT_R15, TactileSensor
 from harness.objectfile.file import ObjectFile
@@ -30,24 +30,24 @@ class BuiltTouch:
     """An ObjectFile and how it came about."""
 
     object: ObjectFile  #: on disk.
-    touch: AuthoredTouch  #: its networks and errors.
+    touch: AuthoredTouch  #: its codes and errors.
     said: tuple[str, ...]  #: what was done to the mesh and what to look at.
     seconds: Mapping[str, float]  #: s on the clock of each stage.
 
 
 def build_touch(wanted: TouchRequest, out: Path, report: Report, threads: int = 1) -> BuiltTouch:
-    """Build an object's touch, or go on with a training that was stopped.
+    """Build an object's touch.
 
     Args:
         wanted: what.
         out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
         report: told of progress.
-        threads: of a training.
+        threads: of the coding.
 
     Raises:
         WrongUse: options that cannot be.
         MeshRefused: a mesh that cannot stand for an object.
-        DataRefused: a checkpoint or an ObjectFile in the folder that is of something else.
+        DataRefused: an ObjectFile in the folder that is of something else.
     """
     chosen = touch_profile(wanted.profile)
     begun = time.perf_counter()
@@ -57,7 +57,7 @@ def build_touch(wanted: TouchRequest, out: Path, report: Report, threads: int = 
     mesh, taken = surface.mesh, time.perf_counter() - begun
     created = created_object(wanted.mesh, wanted.licence, wanted.material, mesh, out, source)
     skirt = skirt_for(wanted.sensor)
-    touch = author_touch(mesh, wanted.sensor, skirt, chosen, wanted.seed, out, report, threads)
+    touch = author_touch(mesh, wanted.sensor, skirt, chosen, wanted.seed, report, threads)
     begun = time.perf_counter()
     report("writing", 0.0)
     part = TouchPart(
@@ -68,9 +68,7 @@ def build_touch(wanted: TouchRequest, out: Path, report: Report, threads: int = 
         near_surface=MOST_MOVED,
         provenance=provenance_of(wanted, "touch", touch.settings, (source,)),
         codes=touch.codes,
-        perceptron=touch.perceptron,
     )
     made = with_touch(created, part)
-    (out / CHECKPOINT).unlink(missing_ok=True)
     seconds = {"mesh": taken, **touch.seconds, "write": time.perf_counter() - begun}
     return BuiltTouch(made, touch, surface.said, seconds)

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from harness.basics.errors import WrongUse
-from harness.basics.files.named_file import nearest
+from harness.authoring.profiles import find_profile
 
 
 @dataclass(frozen=True)
@@ -19,37 +18,20 @@ class CodesSpec:
 
 
 @dataclass(frozen=True)
-class TouchPerceptronSpec:
-    """A perceptron trained by Adam; the network is the paper's, its training our own."""
-
-    depth: int = 8  #: hidden layers.
-    width: int = 256  #: of each.
-    octaves: int = 10  #: of the encoding.
-    skip: int = 5  #: the layer, counted from 0, that takes the encoded input too; 0 for none.
-    presses: int = 4000  #: whose maps are learned from.
-    epochs: int = 100  #: checkpoints on the way.
-    steps: int = 500  #: of Adam in an epoch.
-    batch: int = 4096  #: pixels in a step.
-    rate: float = 5e-4  #: of Adam's first steps; it falls to zero as half a cosine.
-
-
-@dataclass(frozen=True)
 class TouchProfile:
     """One trade of time for accuracy."""
 
     codes: CodesSpec  #: of the surface.
-    perceptron: TouchPerceptronSpec | None  #: None for none.
     presses: int  #: of each kind that errors are measured on.
 
 
 TOUCH_PROFILES: Mapping[str, TouchProfile] = MappingProxyType({
-    "smoke": TouchProfile(CodesSpec(most_bytes=3_000_000, pitch=0.6e-3), None, presses=20),
-    "shipped": TouchProfile(CodesSpec(most_bytes=3_000_000, pitch=0.6e-3), None, presses=200),
-    "standard": TouchProfile(CodesSpec(), None, presses=200),
-    "paper": TouchProfile(CodesSpec(), TouchPerceptronSpec(), presses=200),
+    "smoke": TouchProfile(CodesSpec(most_bytes=3_000_000, pitch=0.6e-3), presses=20),
+    "shipped": TouchProfile(CodesSpec(most_bytes=3_000_000, pitch=0.6e-3), presses=200),
+    "standard": TouchProfile(CodesSpec(), presses=200),
 })  # fmt: skip
-"""Only ``paper`` needs torch: it trains ObjectFolder 2.0's network beside the codes. ``shipped`` is of the
-files that come with the program: as few bytes as ``smoke``, measured on as many presses as ``standard``."""
+"""``shipped`` is of the files that come with the program: as few bytes as ``smoke``, measured on as many
+presses as ``standard``."""
 
 
 def touch_profile(name: str) -> TouchProfile:
@@ -58,7 +40,4 @@ def touch_profile(name: str) -> TouchProfile:
     Raises:
         WrongUse: there is none.
     """
-    found = TOUCH_PROFILES.get(name)
-    if found is None:
-        raise WrongUse(f"no profile {name!r} of touch; {nearest(name, TOUCH_PROFILES)}")
-    return found
+    return find_profile(TOUCH_PROFILES, name, "touch", removed=("paper",))

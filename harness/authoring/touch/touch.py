@@ -1,4 +1,4 @@
-"""From a surface to the networks of its touch, and what they are worth on presses they never saw.
+"""From a surface to the codes of its touch, and what they are worth on presses they never saw.
 
 ``code_surface`` makes the codes: heights around the nodes, in the linear basis that keeps most of them.
 The basis is that of the principal components. For a linear decoder and squared error no training can
@@ -9,7 +9,6 @@ nothing here to descend on.
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
 from onnx import ModelProto
@@ -17,8 +16,8 @@ from threadpoolctl import threadpool_limits
 
 from harness.authoring.touch.data import MOST_TILT, choose_nodes
 from harness.authoring.touch.metrics import PressBench
-from harness.authoring.touch.profiles import CodesSpec, TouchPerceptronSpec, TouchProfile
-from harness.authoring.training import Report, median_seconds, train
+from harness.authoring.touch.profiles import CodesSpec, TouchProfile
+from harness.authoring.training import Report, median_seconds
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import inverse
@@ -27,13 +26,10 @@ from harness.bench.sensor import TactileSensor
 from harness.objectfile.runtime import Network
 from harness.objectfile.touch.graph import PatchCodes, codes_graph
 from harness.objectfile.touch.nodes import BEND, NodeSearch, SurfaceNodes
-from harness.objectfile.touch.part import CODES, CodesPart, PerceptronPart, codes_tensors
+from harness.objectfile.touch.part import CODES, CodesPart, codes_tensors
 from harness.objectfile.touch.touch import CodeMaps
 from harness.sim.gel.gel import GelSkirt
 from harness.sim.gel.height_map import RasterMesh, height_maps
-
-CHECKPOINT = ".touch_training.npz"
-"""Beside ``object.json`` until the training is over."""
 
 SPACINGS = tuple(1e-3 * each for each in (4, 5, 6, 7, 8, 10, 12, 14, 17, 20))
 """m between nodes: the closest that a file has room for is taken."""
@@ -45,8 +41,6 @@ COARSENED = (1.0, 4.0 / 3.0, 5.0 / 3.0, 2.0)
 """Times the profile's pitch that a patch's pixels may be, where no spacing leaves room for finer ones."""
 
 _TIMED = 20
-
-Settings = dict[str, str | float | int | bool | None]
 
 _MARGIN = 1.5e-3
 """m beyond window and spacing that a patch reaches: a leant ray wanders that far."""
@@ -65,14 +59,13 @@ _CHUNK = 16
 
 @dataclass(frozen=True, eq=False)
 class AuthoredTouch:
-    """Networks and their worth."""
+    """Codes and their worth."""
 
     codes: CodesPart  #: to be written.
-    perceptron: PerceptronPart | None  #: to be written; None where the profile has none.
     errors: Mapping[str, Mapping[str, Mapping[str, float]]]
     """``"trained_places"``, ``"unseen_places"`` and ``"any_press"``, of the codes and of what costs nothing
     to compare with: by a name with its unit."""
-    settings: Settings  #: how they were made.
+    settings: Mapping[str, str | float | int | bool | None]  #: how they were made.
     seconds: Mapping[str, float]  #: s on the clock of each stage.
 
 
@@ -82,25 +75,22 @@ def author_touch(
     skirt: GelSkirt,
     profile: TouchProfile,
     seed: int,
-    folder: Path,
     report: Report,
     threads: int = 1,
 ) -> AuthoredTouch:
-    """Make and measure the networks of one object's touch.
+    """Make and measure the codes of one object's touch.
 
     Args:
         mesh: of the object.
         sensor: a flat gel.
         skirt: of the gel, in its pixels.
-        profile: which networks.
-        seed: of nodes, presses, first weights and orders.
-        folder: where a checkpoint is kept; a training that was killed goes on from it.
+        profile: of the codes.
+        seed: of nodes and presses.
         report: told of progress.
-        threads: of a training; with one, a resumed training gives the same network bit for bit.
+        threads: of the coding.
 
     Raises:
         WrongUse: a file too small for any codes of this object.
-        DataRefused: a checkpoint in the folder that cannot be gone on from.
     """
     begun = time.perf_counter()
     report("coding the surface", 0.0)
@@ -128,7 +118,7 @@ def author_touch(
     }
     press = found.presses[:1]
     measured["seconds_per_map"] = median_seconds(lambda: maps(press), _TIMED)
-    settings: Settings = {
+    settings = {
         "network": "codes",
         **asdict(profile.codes),
         "pitch": coded.patches.pitch,
@@ -136,14 +126,8 @@ def author_touch(
         "nodes": len(coded.nodes),
         "variance_kept": coded.kept,
     }
-    perceptron = None
-    if profile.perceptron is not None:
-        begun = time.perf_counter()
-        perceptron, more = _trained(bench, profile.perceptron, seed, folder, report, threads)
-        settings |= more
-        seconds["perceptron"] = time.perf_counter() - begun
     codes = CodesPart(graph, coded.nodes, bench.most_off, measured)
-    return AuthoredTouch(codes, perceptron, errors, settings, seconds)
+    return AuthoredTouch(codes, errors, settings, seconds)
 
 
 def opened_codes(graph: ModelProto, nodes: SurfaceNodes, most_off: float, sensor: TactileSensor) -> CodeMaps:
@@ -187,22 +171,6 @@ def spaced_codes(
         f"{spec.most_bytes / 1e6:.3g} MB even with nodes {SPACINGS[-1] * 1e3:g} mm apart and pixels of "
         f"{COARSENED[-1] * spec.pitch * 1e3:.2g} mm; take a profile with a larger file"
     )
-
-
-def _trained(
-    bench: PressBench, spec: TouchPerceptronSpec, seed: int, folder: Path, report: Report, threads: int
-) -> tuple[PerceptronPart, Settings]:
-    # Heavy, and only here: codes are made without it.
-    import torch
-
-    from harness.authoring.touch.mlp import TouchTraining, learned_from
-
-    torch.set_num_threads(threads)
-    report("simulating presses", 0.0)
-    training = TouchTraining(spec, learned_from(bench, spec.presses, seed), seed)
-    train(training, spec.epochs, folder / CHECKPOINT, report)
-    settings: Settings = {f"perceptron_{key}": value for key, value in asdict(spec).items()}
-    return training.finish(), settings | {"perceptron_last_loss": training.losses[-1]}
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from harness.authoring.profiles import find_profile
 from harness.basics.errors import WrongUse
-from harness.basics.files.named_file import nearest
 from harness.objectfile.vision.network import CELLS, PAPER, NetworkSize
 
 
@@ -93,7 +93,4 @@ def vision_profile(name: str) -> VisionProfile:
     Raises:
         WrongUse: there is none.
     """
-    found = VISION_PROFILES.get(name)
-    if found is None:
-        raise WrongUse(f"no profile {name!r} of vision; {nearest(name, VISION_PROFILES)}")
-    return found
+    return find_profile(VISION_PROFILES, name, "vision")

@@ -29,7 +29,7 @@ def build(
     meshes: chosen.Meshes = None,
     material: chosen.Materials = None,
     senses: chosen.Senses = "audio,touch",
-    profile: Annotated[str, typer.Option(help="Of every sense: smoke, standard or paper.")] = "standard",
+    profile: Annotated[str, typer.Option(help="Of every sense: smoke, shipped or standard.")] = "standard",
     up_to: options.UpTo = "20kHz",
     modes: options.MostModes = 128,
     edge: options.LongestEdge = None,

@@ -34,8 +34,7 @@ def build(
     profile: Annotated[
         str,
         typer.Option(
-            help="smoke, shipped (of the fewest bytes) or standard (no torch), small (of audio), or paper: "
-            "networks of its size."
+            help="smoke, shipped (of the fewest bytes), standard, or, of vision, paper: networks of its size."
         ),
     ] = "standard",
     units: Annotated[
@@ -54,8 +53,7 @@ def build(
     threads: Annotated[
         int | None,
         typer.Option(
-            help="Of a training: 1, and as many as cores for vision; a resumed one of sound or touch "
-            "ends in the same bits with 1.",
+            help="Of the fit or training: 1, and as many as cores for vision.",
             min=1,
         ),
     ] = None,
@@ -73,7 +71,7 @@ def build(
 
     Sound: a tenth of the nodes is held out. Errors there stand beside those of the nearest trained vertex,
     of linear interpolation, and of a float16 table at its own nodes. A stopped build goes on when it is
-    called again: solved modes are kept in the cache, a training in the folder.
+    called again: solved modes are kept in the cache.
 
     Touch: the surface is coded, and its maps of presses that were never shown are compared with the
     simulator's (PSNR of 2 mm), beside the nearest coded place's and an untouched gel. --up-to, --modes and

@@ -52,9 +52,7 @@ def render(
     yaw: Annotated[str, typer.Option(help="The sensor turned about its own axis.", metavar="A")] = "0deg",
     level: Annotated[
         str,
-        typer.Option(
-            help="Where the map comes from: codes, perceptron, or reference (the mesh's rasteriser)."
-        ),
+        typer.Option(help="Where the map comes from: codes, or reference (the mesh's rasteriser)."),
     ] = "codes",
     sensor: Annotated[
         str | None,
@@ -93,9 +91,9 @@ def render(
 ) -> int:
     """What the camera behind a gel sees of a press onto an object, by its ObjectFile.
 
-    The surface of the gel comes from the object's codes or its perceptron; beside it stands what the
-    rasteriser makes of its mesh, and how far the one is from the other. A depth, tilt or place that the
-    networks were not made for is refused.
+    The surface of the gel comes from the object's codes; beside it stands what the rasteriser makes of its
+    mesh, and how far the one is from the other. A depth, tilt or place that the codes were not made for is
+    refused.
 
     Try: touchstone object render touch objects/mug --contact -0.04 0 0.05 --tilt 5deg --out touch.png
     """
@@ -192,11 +190,11 @@ def _level(text: str) -> "TouchLevel":
     from harness.basics.errors import WrongUse
 
     match text:
-        case "codes" | "perceptron" | "reference":
+        case "codes" | "reference":
             return text
-    raise WrongUse(
-        f"no level {text!r} of a touch; --level takes codes, perceptron, or reference for the mesh's"
-    )
+        case "perceptron":
+            raise WrongUse("touch no longer has the level 'perceptron'; take --level codes")
+    raise WrongUse(f"no level {text!r} of a touch; --level takes codes, or reference for the mesh's")
 
 
 def beside_the_mesh(rendered: RenderedPress) -> dict[str, float | None] | None:

@@ -123,7 +123,7 @@ def touch(
     objectfile: Annotated[
         Path | None,
         typer.Option(
-            help="Of a mesh: the object's ObjectFile, for --level touch.shapes=network or =perceptron.",
+            help="Of a mesh: the object's ObjectFile, for --level touch.shapes=network.",
             metavar="FOLDER",
         ),
     ] = None,

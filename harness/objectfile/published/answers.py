@@ -331,8 +331,8 @@ def _write_touches(
 
 def _press_built(of: ObjectFile, rows: Rows, settings: QuerySettings) -> tuple[FloatArray, ByteArray]:
     """Compute maps of indentation and their images; azimuths as of ``object render touch``."""
-    (vertices, gelinfo), described = rows, of.description.touch
-    touch = open_touch(of, "codes" if described is None or described.codes is not None else "perceptron")
+    vertices, gelinfo = rows
+    touch = open_touch(of)
     calibration = None if settings.calibration is None else str(settings.calibration)
     gel = known_gel(None, calibration, shadow=False)
     require_gel(of, touch.entry.gel, gel.sensor, gel.calibration.header.skirt)

@@ -1,4 +1,4 @@
-"""The touch of a scene's object out of its ObjectFile: levels of what rasteriser and skirt compute."""
+"""The touch of a scene's object out of its ObjectFile."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from harness.bench.sensor import TactileSensor
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.same_object import require_same_shape
 from harness.objectfile.touch.tool_depth import CodedDepth, open_tool_depth
-from harness.objectfile.touch.touch import ObjectTouch, TouchLevel, open_touch
+from harness.objectfile.touch.touch import ObjectTouch, open_touch
 from harness.objectfile.touch_entries import GelEntry
 from harness.sim.gel.gel import GelSkirt
 
@@ -25,24 +25,21 @@ def tool_depth_from(of: ObjectFile, surface: Mesh, sensor: TactileSensor, skirt:
     return open_tool_depth(of)
 
 
-def touch_from(
-    of: ObjectFile, level: TouchLevel, surface: Mesh, sensor: TactileSensor, skirt: GelSkirt
-) -> ObjectTouch:
-    """The touch of an object at a level of its ObjectFile.
+def touch_from(of: ObjectFile, surface: Mesh, sensor: TactileSensor, skirt: GelSkirt) -> ObjectTouch:
+    """Open the codes of an object's touch.
 
     Args:
         of: of this object; its material is not asked for.
-        level: of it.
         surface: of the object's material, in metres, in the object's frame.
         sensor: that is pressed.
         skirt: of its gel, in its pixels.
 
     Raises:
         WrongUse: an ObjectFile of another object or another gel; what differs is said.
-        DataRefused: it has no touch, or not at that level; or a file of it is damaged.
+        DataRefused: it has no touch or no codes, or a file of it is damaged.
     """
     _require_own(of, surface, sensor, skirt)
-    return open_touch(of, level)
+    return open_touch(of)
 
 
 def _require_own(of: ObjectFile, surface: Mesh, sensor: TactileSensor, skirt: GelSkirt) -> None:

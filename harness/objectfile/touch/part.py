@@ -1,4 +1,4 @@
-"""Writing the touch of an ObjectFile: codes and their graph, the perceptron's graph, their self-tests."""
+"""Write the touch of an ObjectFile: codes, their graph and its self-test."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,11 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from onnx import ModelProto
 
-from harness.basics.arrays import AnyArray, FloatArray, IntArray
-from harness.basics.errors import WrongUse
+from harness.basics.arrays import AnyArray, IntArray
 from harness.basics.toml_file import validate
 from harness.bench.sensor import TactileSensor
-from harness.objectfile.entries import Domain, Input, NetworkEntry, Provenance, Tensor
+from harness.objectfile.entries import Domain, Input, Provenance, Tensor
 from harness.objectfile.file import ObjectFile, file_entry, with_part
 from harness.objectfile.network_part import SELF_TEST_VALUES, NetworkPart, network_entry, spread
 from harness.objectfile.touch.graph import MOST_TILT
@@ -21,7 +20,6 @@ from harness.sim.gel.height_map import SEARCH_DEPTH
 
 CODES = "touch.onnx"
 NODES = "touch_nodes.npy"
-PERCEPTRON = "touch_perceptron.onnx"
 
 _SELF_TEST_ROWS = 4
 _SELF_TEST_DEPTH = 1e-3
@@ -40,16 +38,6 @@ class CodesPart:
 
 
 @dataclass(frozen=True, eq=False)
-class PerceptronPart:
-    """The paper's network to be written."""
-
-    graph: ModelProto  #: ``touch_perceptron.perceptron_graph``.
-    least: FloatArray  #: ``(9,)`` of each input (``touch_perceptron.pixel_domain``).
-    most: FloatArray  #: ``(9,)``.
-    measured: Mapping[str, float] = field(default_factory=dict)  #: its errors, by a name with its unit.
-
-
-@dataclass(frozen=True, eq=False)
 class TouchPart:
     """A touch to be written."""
 
@@ -59,27 +47,23 @@ class TouchPart:
     most_tilt: float  #: rad.
     near_surface: float  #: m, the farthest from the surface that a press may be.
     provenance: Provenance  #: of the touch.
-    codes: CodesPart | None = None  #: one level; None for the other alone.
-    perceptron: PerceptronPart | None = None  #: the other.
+    codes: CodesPart  #: the network.
 
 
 def with_touch(of: ObjectFile, part: TouchPart) -> ObjectFile:
     """The ObjectFile with this touch written into it.
 
     Raises:
-        WrongUse: there are neither codes nor a perceptron, or numbers that cannot be.
+        WrongUse: numbers that cannot be.
         DataRefused: a graph that must not be run, or that takes or gives something else than touch.
     """
-    if part.codes is None and part.perceptron is None:
-        raise WrongUse("a touch needs codes or a perceptron; give one of them")
     contents: dict[str, bytes] = {}
     described = {
         "gel": GelEntry.of(part.sensor, part.skirt),
         "depth_m": part.depths,
         "most_tilt_rad": part.most_tilt,
         "near_surface_m": part.near_surface,
-        "codes": None if part.codes is None else _codes(part, part.codes, contents),
-        "perceptron": None if part.perceptron is None else _perceptron(part.perceptron, contents),
+        "codes": _codes(part, contents),
         "provenance": part.provenance,
     }
     entry = validate(described, TouchEntry, f"the touch of {of.description.name}")
@@ -138,30 +122,8 @@ def codes_tensors(
     return (node, pose), (maps, gaps)
 
 
-def perceptron_tensors(least: FloatArray, most: FloatArray) -> tuple[tuple[Input], tuple[Tensor]]:
-    """What the paper's network takes and gives."""
-    pixel = Input(
-        name="pixel",
-        dtype="float64",
-        shape=("n", 9),
-        unit="m, m, m, rad, 1, 1, m, pixel, pixel",
-        meaning="place x y z, tilt, cosine and sine of its azimuth, depth, row, column",
-        frame="object",
-        domain=Domain(low=tuple(least.tolist()), high=tuple(most.tolist())),
-        normaliser="in the graph",
-    )
-    depth = Tensor(
-        name="depth",
-        dtype="float32",
-        shape=("n", 1),
-        unit="m",
-        meaning="how far the gel is pressed in",
-        frame="gel",
-    )
-    return (pixel,), (depth,)
-
-
-def _codes(part: TouchPart, codes: CodesPart, contents: dict[str, bytes]) -> CodesEntry:
+def _codes(part: TouchPart, contents: dict[str, bytes]) -> CodesEntry:
+    codes = part.codes
     count = len(codes.nodes)
     deepest = part.sensor.gel_thickness
     inputs, outputs = codes_tensors(count, codes.most_off + deepest, part.sensor)
@@ -179,16 +141,6 @@ def _codes(part: TouchPart, codes: CodesPart, contents: dict[str, bytes]) -> Cod
         most_off_m=codes.most_off,
         deepest_m=deepest,
         most_tilt_rad=MOST_TILT,
-    )
-
-
-def _perceptron(part: PerceptronPart, contents: dict[str, bytes]) -> NetworkEntry:
-    inputs, outputs = perceptron_tensors(part.least, part.most)
-    shares = np.random.default_rng(0).random((SELF_TEST_VALUES, len(part.least)))
-    asked = {"pixel": part.least + shares * (part.most - part.least)}
-    return network_entry(
-        NetworkPart(PERCEPTRON, part.graph, inputs, outputs, asked, _TOLERANCE, part.measured, _seen),
-        contents,
     )
 
 

@@ -13,14 +13,14 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
-from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.runtime import Network
 from harness.objectfile.self_test import open_network
 from harness.objectfile.touch.graph import MOST_TILT
 from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes
-from harness.objectfile.touch.touch import nodes_of, touch_of
+from harness.objectfile.touch.touch import coded, nodes_of, touch_of
 from harness.objectfile.touch_entries import GelEntry
 from harness.sim.gel.height_map import SEARCH_DEPTH
 from harness.sim.solid.surface_samples import random_points, thin
@@ -145,13 +145,7 @@ def open_tool_depth(of: ObjectFile, threads: int = 1) -> CodedDepth:
     Raises:
         DataRefused: it has no codes, or a file of it is damaged.
     """
-    touch = touch_of(of)
-    entry = touch.codes
-    if entry is None:
-        raise DataRefused(
-            f"the touch of {of.description.name} has no codes; build it again, or take "
-            "touch.shapes = reference"
-        )
+    touch, entry = touch_of(of), coded(of)
     nodes = NodeSearch(nodes_of(of, entry), entry.most_off_m)
     places = _spread(of.mesh)
     owners, gaps = nodes.nearest_to(places)

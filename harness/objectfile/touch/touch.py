@@ -1,8 +1,7 @@
 """The touch of an ObjectFile: from presses on the object to the surface of the gel.
 
-Three levels of one quantity: ``codes`` (``touch.onnx``), ``perceptron`` (the network of ObjectFolder
-2.0, ``touch_perceptron.onnx``) and ``reference``, the rasteriser on ``mesh.ply``, which the others are
-measured against. All refuse what they were not made for.
+Two levels of one quantity: ``codes`` (``touch.onnx``) and ``reference``, the rasteriser on ``mesh.ply``,
+which codes are measured against. Both refuse what they were not made for.
 """
 
 from collections.abc import Mapping
@@ -17,7 +16,6 @@ from harness.basics.geometry import inverse
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.surface_search import SurfaceSearch, require_own
 from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes, nodes_from
-from harness.objectfile.touch.pixels import pixel_queries
 from harness.objectfile.touch_entries import CodesEntry, GelEntry, TouchEntry
 from harness.sim.gel.gel import deform, over_range, require_within_gel
 from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
@@ -26,7 +24,7 @@ from harness.sim.gel.presses import Presses
 if TYPE_CHECKING:
     from harness.objectfile.runtime import Network
 
-TouchLevel = Literal["codes", "perceptron", "reference"]
+TouchLevel = Literal["codes", "reference"]
 
 CHUNK = 16
 """Maps to a run: more are no faster, and take memory."""
@@ -52,22 +50,6 @@ class CodeMaps:
     def __call__(self, presses: Presses) -> AnyArray:
         """``(n, rows, columns)`` m; refuses a press that no code is near."""
         return self.network(self.nodes.queries(presses))["maps"]
-
-
-@dataclass(frozen=True, eq=False)
-class PerceptronMaps:
-    """Maps from the perceptron, pixel by pixel."""
-
-    network: "Network"
-    gel: GelEntry
-
-    def __call__(self, presses: Presses) -> AnyArray:
-        """``(n, rows, columns)`` m; refuses a yaw, of which the network knows nothing."""
-        maps = np.empty((len(presses), self.gel.rows, self.gel.columns), np.float32)
-        for number in range(len(presses)):
-            asked = pixel_queries(presses[number : number + 1], self.gel.sensor)
-            maps[number] = self.network({"pixel": asked[0]})["depth"].reshape(maps.shape[1:])
-        return maps
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +84,8 @@ class ObjectTouch:
     @property
     def measured(self) -> Mapping[str, float]:
         """Errors of the level, by names with units; none of the reference."""
-        match self.level:
-            case "codes" if self.entry.codes is not None:
-                return self.entry.codes.network.measured
-            case "perceptron" if self.entry.perceptron is not None:
-                return self.entry.perceptron.measured
+        if self.level == "codes" and self.entry.codes is not None:
+            return self.entry.codes.network.measured
         return {}
 
     def at(self, presses: Presses) -> FloatArray:
@@ -134,7 +113,7 @@ class ObjectTouch:
         """m, least and greatest depth, and rad, the greatest tilt."""
         codes = self.entry.codes
         # The mesh answers any press, and is asked beside the others.
-        if self.level != "perceptron" and codes is not None:
+        if codes is not None:
             return 0.0, codes.deepest_m, codes.most_tilt_rad
         return *self.entry.depth_m, self.entry.most_tilt_rad
 
@@ -166,29 +145,22 @@ def open_touch(of: ObjectFile, level: TouchLevel = "codes", threads: int = 1) ->
 
     Args:
         of: an object that has a touch.
-        level: ``"codes"``, ``"perceptron"`` or ``"reference"``.
-        threads: that a network may use.
+        level: ``"codes"`` or ``"reference"``.
+        threads: that the network may use.
 
     Raises:
-        DataRefused: the object has no touch, or not at that level; or a file of it is damaged.
+        DataRefused: the object has no touch or no codes, or a file of it is damaged.
         WrongUse: an unknown level.
     """
-    entry, name = touch_of(of), of.description.name
+    entry = touch_of(of)
     maps: Maps
     match level:
         case "reference":
             maps = ReferenceMaps(RasterMesh(of.mesh), entry.gel)
-        case "codes" if entry.codes is not None:
-            maps = _codes(of, entry.codes, threads)
-        case "perceptron" if entry.perceptron is not None:
-            from harness.objectfile.self_test import open_network
-
-            network = open_network(of.read(entry.perceptron), entry.perceptron, threads)
-            maps = PerceptronMaps(network, entry.gel)
-        case "codes" | "perceptron":
-            raise DataRefused(f"the touch of {name} has no {level}; take another level, or build it again")
+        case "codes":
+            maps = _codes(of, coded(of), threads)
         case _:
-            raise WrongUse(f"no level {level!r} of a touch; there is codes, perceptron, reference")
+            raise WrongUse(f"no level {level!r} of a touch; there is codes and reference")
     return ObjectTouch(level, entry, SurfaceSearch(of.mesh), maps)
 
 
@@ -199,6 +171,21 @@ def touch_of(of: ObjectFile) -> TouchEntry:
             f"{of.description.name} has no touch; add it with `touchstone object build --only touch`"
         )
     return of.description.touch
+
+
+def coded(of: ObjectFile) -> CodesEntry:
+    """Return the codes of an object's touch.
+
+    Raises:
+        DataRefused: the object has no touch, or only the perceptron that earlier versions trained.
+    """
+    codes = touch_of(of).codes
+    if codes is None:
+        raise DataRefused(
+            f"the touch of {of.description.name} holds only a perceptron, which this version does not "
+            "render; add codes with `touchstone object build --only touch`, or take the level reference"
+        )
+    return codes
 
 
 def nodes_of(of: ObjectFile, entry: CodesEntry) -> SurfaceNodes:

@@ -21,19 +21,17 @@ from rich.table import Table
 from threadpoolctl import threadpool_limits
 
 from harness.authoring.audio.audio import waves_graph
-from harness.authoring.audio.profiles import PROFILES, PerceptronSpec
+from harness.authoring.audio.profiles import PROFILES
 from harness.authoring.audio.waves import Waves
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.objectfile.audio.audio import ObjectAudio, open_audio
 from harness.objectfile.audio.blow import HammerBlow
-from harness.objectfile.audio.graph import audio_graph
 from harness.objectfile.audio.part import AudioPart, with_audio
 from harness.objectfile.audio.strike import Place, place_of_vertex, strike
 from harness.objectfile.file import create_object
-from harness.objectfile.graph import Encoding
 from tests.oracles.summed_modes import COUNTS, DURATION, RATE, RATES, Case, case, error, outer, said, timed
-from tests.samples.object_bench import PROVENANCE, egg, egg_modes, normaliser, perceptron, scales
+from tests.samples.object_bench import PROVENANCE, egg, egg_modes
 
 NEAR = 2e-3
 SUBDIVISIONS = 5
@@ -43,19 +41,12 @@ SUBDIVISIONS = 5
 def graph(profile: str, modes: int, mesh: Mesh) -> ModelProto:
     """A network of a profile's size, with random weights."""
     spec = PROFILES[profile].network
-    if not isinstance(spec, PerceptronSpec):
-        random = np.random.default_rng(modes)
-        width = max(spec.width, spec.widest)
-        weights = random.standard_normal((width + 4, 3 * modes))
-        vectors, phases = random.standard_normal((3, width)), random.uniform(0.0, 6.0, width)
-        low, high = mesh.bounds
-        return waves_graph(Waves(0.5 * (low + high), 20.0, 6.0 * vectors, phases, weights))
-    encoding, skips = Encoding.octaves(spec.octaves), (spec.skip,) if spec.skip else ()
-    branches = [
-        perceptron(seed, 3 * modes // spec.branches, spec.width, spec.depth, skips, encoding)
-        for seed in range(spec.branches)
-    ]
-    return audio_graph(branches, normaliser(mesh), scales(modes), encoding)
+    random = np.random.default_rng(modes)
+    width = max(spec.width, spec.widest)
+    weights = random.standard_normal((width + 4, 3 * modes))
+    vectors, phases = random.standard_normal((3, width)), random.uniform(0.0, 6.0, width)
+    low, high = mesh.bounds
+    return waves_graph(Waves(0.5 * (low + high), 20.0, 6.0 * vectors, phases, weights))
 
 
 def opened(folder: Path, profile: str, one: Case) -> ObjectAudio:
@@ -105,7 +96,7 @@ def main() -> None:
         table.add_column(heading)
     with threadpool_limits(limits=1):
         for modes in asked.modes:
-            for profile in asked.profile or ["standard", "paper"]:
+            for profile in asked.profile or ["standard"]:
                 for each in rows(modes, profile, asked.repeats):
                     table.add_row(*each)
     Console(width=150).print(table)

@@ -4,8 +4,7 @@
 [--repeat 9]`` presses at random places that were never coded, with every level in one run. Without a folder,
 codes are made and written first. Seconds are CPU time of one thread for each map, from presses to the gel's
 surface, median and quartiles; the last rows are maps a second on two threads, by the clock and for each
-second of a core, of which a busy machine gives less than two. The perceptron's seconds do not depend on its
-weights: where the file has none, they are measured with random ones and no error is shown.
+second of a core, of which a busy machine gives less than two.
 Rows that cost nothing stand beside: one map for each coded place, and the untouched gel.
 """
 
@@ -30,22 +29,17 @@ from harness.bench.sensor import GELSIGHT_R15
 from harness.effects.touch_drawing import optics
 from harness.objectfile.entries import Provenance
 from harness.objectfile.file import ObjectFile, create_object
-from harness.objectfile.graph import MlpWeights
-from harness.objectfile.runtime import Network
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.touch.graph import codes_graph
 from harness.objectfile.touch.nodes import nodes_from
-from harness.objectfile.touch.part import PERCEPTRON, CodesPart, TouchPart, perceptron_tensors, with_touch
-from harness.objectfile.touch.perceptron import paper_normaliser, perceptron_graph, pixel_domain
+from harness.objectfile.touch.part import CodesPart, TouchPart, with_touch
 from harness.objectfile.touch.touch import (
     CHUNK,
     CodeMaps,
     Maps,
     ObjectTouch,
-    PerceptronMaps,
     open_touch,
 )
-from harness.objectfile.touch_entries import GelEntry
 from harness.objects.household import MATERIALS, build
 from harness.picture.image_metrics import mean_square, psnr, ssim
 from harness.sim.gel.height_map import RasterMesh
@@ -55,8 +49,6 @@ from harness.sim.optics.tactile_calibration import shipped_calibration
 CALIBRATION = shipped_calibration("gelsight_r15_bench")
 SKIRT = CALIBRATION.header.skirt
 SEED = 11
-PAPER = [189, 256, 256, 256, 256, 256 + 189, 256, 256, 256]
-"""Numbers that each layer of the paper's network takes."""
 
 
 def main() -> None:
@@ -109,7 +101,6 @@ def measure(of: ObjectFile, asked: argparse.Namespace) -> None:
         table.add_column(head)
     for said, touch in (("rasteriser (reference)", reference), ("codes", coded)):
         table.add_row(said, *_errors(touch.at(presses), truth), *_costs(touch.at, presses, asked.repeat))
-    table.add_row(*_perceptron(of, presses, asked.repeat))
     table.add_row("nearest coded place", *_errors(_nearest(of, codes, reference, presses), truth), "", "")
     table.add_row("untouched gel", *_errors(np.zeros_like(truth), truth), "", "")
     console = Console(width=150)
@@ -181,33 +172,6 @@ def _cost(ask: Callable[[Presses], object], batches: list[Presses], repeat: int)
         took.append(1e3 * (time.thread_time() - begun) / sum(len(batch) for batch in batches))
     low, middle, high = np.quantile(took, [0.25, 0.5, 0.75])
     return f"{middle:.3g} ({low:.3g} to {high:.3g})"
-
-
-def _perceptron(of: ObjectFile, presses: Presses, repeat: int) -> tuple[str, ...]:
-    touch = of.description.touch
-    assert touch is not None
-    upright = Presses(
-        presses.points,
-        presses.normals,
-        presses.depths,
-        presses.tilts,
-        presses.azimuths,
-        np.zeros(len(presses)),
-    )[:8]
-    if touch.perceptron is not None:
-        learned = open_touch(of, "perceptron")
-        truth = open_touch(of, "reference").at(upright)
-        alone = _cost(learned.at, [upright[:1]], max(1, repeat // 3))
-        return ("perceptron, at no yaw", *_errors(learned.at(upright), truth), alone, "")
-    random = np.random.default_rng(0)
-    sizes = zip(PAPER, [*[256] * 8, 1], strict=True)
-    layers = [(random.normal(0.0, np.sqrt(2.0 / i), (i, o)), np.zeros(o)) for i, o in sizes]
-    low, high = of.mesh.bounds
-    least, most = pixel_domain(low, high, DEPTHS, MOST_TILT, GELSIGHT_R15)
-    graph = perceptron_graph(MlpWeights(tuple(layers), (5,)), paper_normaliser(least, most), 2.5e-3)
-    network = Network(graph.SerializeToString(), PERCEPTRON, *perceptron_tensors(least, most))
-    maps = PerceptronMaps(network, GelEntry.of(GELSIGHT_R15, SKIRT))
-    return ("perceptron, untrained", *[""] * 8, _cost(maps, [upright[:1]], max(1, repeat // 3)), "")
 
 
 def _twice(of: ObjectFile) -> Maps:

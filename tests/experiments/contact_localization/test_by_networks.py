@@ -12,7 +12,7 @@ from experiments.contact_localization.accuracy.benchmark_runs import Cell
 from experiments.contact_localization.answer import Answer, ContactAnswering
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.section import Localization
-from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.errors import DataRefused
 from harness.bench.scene import scene_from_options
 from harness.bench.station_file import load_station, station_path
 from harness.effects import sound_effects
@@ -103,11 +103,6 @@ def test_a_pose_that_no_network_answers_is_drawn_and_said(run: RunFiles, drawn: 
     assert drawn
     (note,) = comparison.notes
     assert note.startswith("the readings are drawn with touch.shapes = reference: ")
-
-
-def test_a_perceptron_answers_no_candidates(run: RunFiles) -> None:
-    with pytest.raises(WrongUse, match=r"single presses, of no yaw.*touch\.shapes = network or reference"):
-        answered(run, "touch.shapes=perceptron")
 
 
 def test_a_damaged_network_in_a_run_is_refused(run: RunFiles) -> None:

@@ -1,12 +1,22 @@
 """1.0's touch, trained for seconds, beats one colour; the untouched gel is known; presses are its kind."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from experiments.paper.rendering import FitSpec, RenderingWork
-from experiments.paper.touch import MIDDLE, TouchBench, first_touch, pixel_places, touch_bench, untouched
+from experiments.paper.touch import (
+    MIDDLE,
+    PressInputs,
+    TouchBench,
+    first_touch,
+    pixel_places,
+    second_touch,
+    touch_bench,
+    untouched,
+)
 from harness.authoring.touch.data import DEPTHS, MOST_TILT
 from harness.basics.store import Store
 from tests.samples.touch_bench import ball
@@ -44,17 +54,31 @@ def test_the_reference_scores_as_the_same_and_the_untouched_gel_does_not(bench: 
     assert nothing["psnr_db"] < 40.0
 
 
+def test_inputs_of_2_0_are_normalised_as_the_paper_does(bench: TouchBench) -> None:
+    inputs, count = PressInputs.of(bench.places), bench.maps[0].size
+    rows = inputs.rows(bench.presses[:1], np.arange(count))
+    assert (rows >= np.array([0.0] * 4 + [-1.0] * 2 + [0.0] * 3)).all()
+    assert (rows <= 1.0).all()
+    press, bounds = bench.presses[:1], bench.places.mesh.bounds
+    np.testing.assert_allclose(rows[0, :3], ((press.points - bounds[0]) / np.ptp(bounds, axis=0))[0])
+    np.testing.assert_allclose(rows[0, 3:6], [0.0, 1.0, 0.0], atol=1e-12)
+    assert rows[1, 7:].tolist() == [0.0, 1.0 / (bench.maps.shape[2] - 1)]
+    assert rows[-1, 7:].tolist() == [1.0, 1.0]
+
+
 def test_pixels_are_placed_row_by_row() -> None:
     places = pixel_places((2, 3))
     assert places.tolist() == [[-1, -1], [-1, 0], [-1, 1], [1, -1], [1, 0], [1, 1]]
 
 
+@pytest.mark.parametrize(("method", "skip"), [(first_touch, 0), (second_touch, 2)])
 def test_a_network_that_was_trained_for_seconds_beats_one_colour(
-    bench: TouchBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    bench: TouchBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: Any, skip: int
 ) -> None:
     pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
-    small = FitSpec(depth=3, width=64, octaves=4, steps=150, batch=2048, rate=4e-3)
+    small = FitSpec(depth=3, width=64, octaves=4, skip=skip, steps=150, batch=2048, rate=4e-3)
     monkeypatch.setattr("experiments.paper.touch.COLOURS", small)
-    picture = first_touch(bench, work(tmp_path)).make().render(0)
+    monkeypatch.setattr("experiments.paper.touch.TOUCHNET", small)
+    picture = method(bench, work(tmp_path)).make().render(0)
     mean = np.broadcast_to(bench.picture(bench.maps[0]).mean(axis=(0, 1)), picture.shape)
     assert bench.scores(0, picture)["psnr_db"] > bench.scores(0, mean)["psnr_db"] + 3.0

@@ -6,7 +6,6 @@ import trimesh
 
 from harness.basics.arrays import FloatArray
 from harness.sim.modal.modes import Modes
-from harness.sim.solid.modal_mesh import QuadraticMesh, quadratic_mesh
 
 MODES = 6
 
@@ -46,11 +45,3 @@ def egg() -> Modes:
     ball = trimesh.creation.icosphere(subdivisions=3)
     points = np.asarray(ball.vertices, dtype=np.float64) * [0.03, 0.04, 0.05]
     return modes_on(points, np.asarray(ball.faces, dtype=np.int64))
-
-
-@pytest.fixture
-def ten_node_cell() -> Modes:
-    """One cell of ten nodes, its surface listed as the solver lists it."""
-    corners = 0.05 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    mesh: QuadraticMesh = quadratic_mesh(corners, np.array([[0, 1, 2, 3]]))
-    return modes_on(mesh.nodes, mesh.triangles)

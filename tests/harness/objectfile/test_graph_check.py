@@ -9,19 +9,19 @@ import onnx
 import pytest
 from onnx import ModelProto, NodeProto, TensorProto, helper, numpy_helper
 
+from harness.authoring.audio.audio import waves_graph
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused
 from harness.objectfile import graph_cost
-from harness.objectfile.audio.graph import audio_graph
 from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.graph_check import checked_graph, declared
 from harness.objectfile.graph_cost import GraphCost, query_cost
 from harness.objectfile.runtime import Network
-from tests.samples.object_bench import ENCODING, MODES, egg, normaliser, perceptron, scales
+from tests.samples.object_bench import MODES, egg_waves
 
 
 def good() -> ModelProto:
-    return audio_graph([perceptron(0, 3 * MODES)], normaliser(egg()), scales(), ENCODING)
+    return waves_graph(egg_waves())
 
 
 def tiny(nodes: list[NodeProto], constants: dict[str, AnyArray] | None = None, axes: int = 2) -> ModelProto:

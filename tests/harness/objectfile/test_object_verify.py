@@ -1,5 +1,6 @@
 """Verifying finds each kind of damage in its own check, and says what to do; a sound object passes all."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,11 +8,11 @@ import numpy as np
 import pytest
 from onnx import TensorProto, helper, load_model_from_string, numpy_helper
 
+from harness.authoring.audio.audio import waves_graph
 from harness.basics.errors import DataRefused
 from harness.basics.files.lock_file import hold_folder
 from harness.basics.mesh import Mesh
 from harness.objectfile.audio.audio import open_audio
-from harness.objectfile.audio.graph import OutputScales, audio_graph
 from harness.objectfile.audio.table import table_bytes
 from harness.objectfile.entries import Domain, Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
 from harness.objectfile.file import ObjectFile, file_entry
@@ -19,7 +20,7 @@ from harness.objectfile.self_test import open_network
 from harness.objectfile.surface_file import ply_bytes
 from harness.objectfile.verify.network import look_at_domain, look_at_self_test
 from harness.objectfile.verify.verify import verify
-from tests.samples.object_bench import ENCODING, MODES, egg, exchange, normaliser, perceptron, rewrite, scales
+from tests.samples.object_bench import MODES, egg, egg_waves, exchange, rewrite
 
 SAMPLES = Path(__file__).parent / "samples"
 
@@ -73,21 +74,21 @@ def test_the_lock_of_a_build_is_not_a_foreign_file(spoiled: Path) -> None:
 
 
 def test_another_network_of_the_same_shape_fails_the_self_test(spoiled: Path) -> None:
-    other = audio_graph([perceptron(99, 3 * MODES)], normaliser(egg()), scales(), ENCODING)
+    other = waves_graph(egg_waves(99))
     found = failures(exchange(spoiled, "audio.onnx", other.SerializeToString()))
     assert "onnxruntime" in found["audio: self-test"]
     assert "audio: graph" not in found
 
 
 def test_a_network_of_another_size_is_not_the_one_described(spoiled: Path) -> None:
-    other = audio_graph([perceptron(0, 3 * MODES + 3)], normaliser(egg()), scales(MODES + 1), ENCODING)
+    other = waves_graph(egg_waves(0, MODES + 1))
     found = failures(exchange(spoiled, "audio.onnx", other.SerializeToString()))
     assert "object.json" in found["audio: graph"]
 
 
 def test_a_network_that_overflows_within_its_domain_fails_there(spoiled: Path) -> None:
-    scale = OutputScales(np.full((MODES, 3), 3e38), np.zeros((MODES, 3)))
-    other = audio_graph([perceptron(0, 3 * MODES)], normaliser(egg()), scale, ENCODING)
+    waves = egg_waves()
+    other = waves_graph(replace(waves, weights=np.full_like(waves.weights, 3e38)))
     found = failures(exchange(spoiled, "audio.onnx", other.SerializeToString()))
     assert "finite" in " ".join(found["audio: domain"].split())
 

@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.authoring.audio.data import (
-    between_nodes,
     canonical,
     clusters,
     node_areas,
@@ -104,33 +103,6 @@ def test_every_node_is_on_one_side(count: int, share: float, seed: int) -> None:
 def test_a_share_that_leaves_nothing_is_refused(share: float) -> None:
     with pytest.raises(WrongUse, match=r" of 100 nodes"):
         split_nodes(100, share)
-
-
-def test_places_between_nodes_are_quadratic_in_a_cell_of_ten(ten_node_cell: Modes) -> None:
-    def field(points: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> object:
-        x, y, z = points.T
-        return 1.0 + x - 3.0 * y + x * y + 20.0 * z * z - 7.0 * x * z
-
-    shapes = np.repeat(np.asarray(field(ten_node_cell.points))[:, None, None], 3, axis=2)
-    modes = replace(ten_node_cell, frequencies=np.array([100.0]), shapes=shapes)
-    found = between_nodes(modes, np.full(10, True), each=20, seed=0)
-    assert len(found.points) == 80
-    assert found.shapes[:, 0, 0] == pytest.approx(np.asarray(field(found.points)), rel=1e-12)
-
-
-def test_places_between_nodes_never_show_a_node_that_is_held_out(ten_node_cell: Modes) -> None:
-    allowed = np.full(10, True)
-    allowed[0] = False
-    found = between_nodes(ten_node_cell, allowed, each=5, seed=0)
-    assert len(found.points) == 5  # one of four faces is without the first corner
-    assert found.points.sum(axis=1) == pytest.approx(0.05, rel=1e-12)
-
-
-def test_triangles_that_are_no_parts_of_larger_ones_are_linear(egg: Modes) -> None:
-    linear = replace(egg, shapes=np.repeat(egg.points[:, None, :], 6, axis=1))
-    found = between_nodes(linear, np.full(len(egg.points), True), each=1, seed=0)
-    assert len(found.points) == len(egg.faces)
-    assert np.abs(found.shapes[:, 0] - found.points).max() < 1e-15
 
 
 def test_the_wave_number_is_near_the_fastest_wave_s(egg: Modes) -> None:

@@ -1,5 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +19,7 @@ from harness.authoring.audio.waves import (
 from harness.basics.errors import WrongUse
 from harness.objectfile.graph import Storage
 from harness.sim.modal.modes import Modes
+from tests.samples.object_bench import egg_waves
 
 STORAGES: tuple[Storage, ...] = ("float16", "float32")
 
@@ -120,9 +120,40 @@ def test_a_node_at_rest_does_not_rule_the_fit() -> None:
     assert shares.max() < 2e3
 
 
-def test_an_unknown_profile_is_refused_by_name() -> None:
-    with pytest.raises(WrongUse, match=r"'standart'.*standard"):
-        profile("standart")
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("standart", r"'standart'.*standard"), ("paper", r"'paper'.*standard")],
+)
+def test_an_unknown_or_removed_profile_is_refused_by_name(name: str, said: str) -> None:
+    with pytest.raises(WrongUse, match=said):
+        profile(name)
+
+
+def test_the_same_waves_give_the_same_bytes() -> None:
+    first, second = (waves_graph(egg_waves()) for _ in range(2))
+    assert first.SerializeToString(deterministic=True) == second.SerializeToString(deterministic=True)
+
+
+def test_half_precision_weights_take_half_the_file() -> None:
+    waves = egg_waves(modes=100)
+    assert waves_graph(waves, "float16").ByteSize() < 0.6 * waves_graph(waves).ByteSize()
+
+
+def test_subnormal_weights_are_written_as_zero() -> None:
+    weights = np.full((28, 21), 1e-40)
+    weights[-1] = np.arange(1.0, 22.0)
+    found = opened(waves_graph(replace(egg_waves(), weights=weights)), 7)({"points": np.zeros((5, 3))})
+    assert found["gains"].reshape(5, -1) == pytest.approx(np.tile(weights[-1], (5, 1)), abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("bad", "storage"), [(np.nan, "float32"), (np.inf, "float32"), (1e39, "float32"), (1e5, "float16")]
+)
+def test_weights_that_the_file_cannot_hold_are_refused(bad: float, storage: Storage) -> None:
+    waves = egg_waves()
+    waves.weights[2, 3] = bad
+    with pytest.raises(WrongUse, match=f"the linear layer has 1 numbers that are not finite in {storage}"):
+        waves_graph(waves, storage)
 
 
 def test_silent_modes_do_not_stop_the_waves(egg: Modes) -> None:
@@ -132,14 +163,13 @@ def test_silent_modes_do_not_stop_the_waves(egg: Modes) -> None:
     assert np.abs(network(egg.points)[:, 2]).max() < 1e-12
 
 
-def test_authoring_measures_on_nodes_it_never_saw(egg: Modes, tmp_path: Path) -> None:
+def test_authoring_measures_on_nodes_it_never_saw(egg: Modes) -> None:
     said = []
     made = author_audio(
         egg,
         np.full(6, 20.0),
         AudioProfile(WavesSpec(200), sounds=2),
         0,
-        tmp_path,
         lambda doing, share: said.append((doing, share)),
     )
     assert len(made.split.held_out) == 64

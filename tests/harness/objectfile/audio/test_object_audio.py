@@ -25,14 +25,11 @@ from harness.sim.sound.modal_radiation import radiation
 from tests.samples.object_bench import (
     MODES,
     NEAR,
-    computed,
     egg,
     egg_modes,
     egg_part,
+    egg_waves,
     exchange,
-    normaliser,
-    perceptron,
-    scales,
 )
 
 HALF = 2.0**-10
@@ -58,7 +55,7 @@ def test_the_modes_are_those_that_were_written(network: ObjectAudio) -> None:
 def test_the_network_gives_the_shapes_it_was_made_of(network: ObjectAudio) -> None:
     points, normals = SurfaceSearch(egg()).spread(2 * CHUNK + 3)
     points = points + 0.9 * NEAR * normals
-    exact = computed([perceptron(0, 3 * MODES)], points, normaliser(egg()), scales())
+    exact = egg_waves()(points)
     assert np.abs(network.at(points) - exact).max() <= 3e-5 * np.abs(exact).max()
 
 

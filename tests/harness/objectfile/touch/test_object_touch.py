@@ -11,7 +11,6 @@ import pytest
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.touch.nodes import SurfaceNodes, nodes_bytes, nodes_from
-from harness.objectfile.touch.part import with_touch
 from harness.objectfile.touch.touch import CodeMaps, open_touch
 from harness.objectfile.verify.touch import look_at_codes
 from harness.objectfile.verify.verify import verify
@@ -121,17 +120,40 @@ def test_a_press_with_the_normal_of_another_place_is_refused(peg_object: ObjectF
 def test_levels_that_are_not_there_are_said(peg_object: ObjectFile, egg_object: ObjectFile) -> None:
     with pytest.raises(DataRefused, match="--only touch"):
         open_touch(egg_object)
-    with pytest.raises(DataRefused, match="has no perceptron"):
-        open_touch(peg_object, "perceptron")
     wrong: Any = "fine"
-    with pytest.raises(WrongUse, match="there is codes, perceptron, reference"):
+    with pytest.raises(WrongUse, match="there is codes and reference"):
         open_touch(peg_object, wrong)
 
 
-def test_a_touch_of_nothing_is_no_touch(peg_object: ObjectFile) -> None:
-    part = tb.peg_part()
-    with pytest.raises(WrongUse, match="codes or a perceptron"):
-        with_touch(peg_object, replace(part, codes=None))
+@pytest.mark.parametrize("alone", [False, True], ids=["beside codes", "alone"])
+def test_an_object_with_the_perceptron_of_an_earlier_version_still_opens(
+    spoiled_peg: Path, alone: bool
+) -> None:
+    shutil.copy(spoiled_peg / "touch.onnx", spoiled_peg / "touch_perceptron.onnx")
+    if alone:
+        for name in ("touch.onnx", "touch_nodes.npy"):
+            (spoiled_peg / name).unlink()
+
+    def add_perceptron(tree: dict[str, Any]) -> None:
+        touch = tree["touch"]
+        touch["perceptron"] = {**touch["codes"]["network"], "file": "touch_perceptron.onnx"}
+        touch["codes"] = None if alone else touch["codes"]
+
+    of = rewrite(spoiled_peg, add_perceptron)
+    assert not failures(of)
+    assert open_touch(of, "reference").at(presses()).any()
+    if alone:
+        with pytest.raises(DataRefused, match=r"only a perceptron.*add codes with .*--only touch"):
+            open_touch(of)
+    else:
+        assert open_touch(of).at(presses()).any()
+    (of.folder / "touch_perceptron.onnx").write_bytes(b"changed")
+    assert set(failures(of)) == {"touch_perceptron.onnx: bytes"}
+
+
+def test_a_touch_of_nothing_is_no_touch(spoiled_peg: Path) -> None:
+    with pytest.raises(DataRefused, match="neither codes nor a perceptron"):
+        rewrite(spoiled_peg, lambda tree: tree["touch"].update(codes=None))
 
 
 @pytest.mark.parametrize("name", ["touch.onnx", "touch_nodes.npy"])

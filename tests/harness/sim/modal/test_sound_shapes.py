@@ -76,7 +76,7 @@ def of(solved: Modes, tmp_path_factory: pytest.TempPathFactory) -> ObjectFile:
     """Its ObjectFile, made of that solution, as `object build` does."""
     folder, modes = tmp_path_factory.mktemp("objects") / "egg", canonical(solved)
     rates = dampings(modes.frequencies, PLASTIC)
-    made = author_audio(modes, rates, profile("smoke"), 0, folder, lambda _what, _share: None)
+    made = author_audio(modes, rates, profile("smoke"), 0, lambda _what, _share: None)
     part = AudioPart(
         modes=modes,
         dampings=rates,
