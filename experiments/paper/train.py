@@ -11,22 +11,25 @@ pcn=FOLDER``). The latter wants a graphics processor: there seven minutes, witho
 """
 
 import argparse
-import json
 import sys
-import time
 from dataclasses import dataclass
-from importlib.util import find_spec
-from pathlib import Path
+from functools import partial
 from types import MappingProxyType
-from typing import Any
 
 from experiments.paper.scale_networks import SIZE_INPUTS
-from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS as COMPLETION_INPUTS
-from experiments.shape_reconstruction.pcn.training.profiles import CompletionProfile
-from harness.basics.cores import own_cores
-
-PROFILES = ("paper", "paper-smoke")
-"""As published, and one that shows in a minute that all of it runs."""
+from experiments.paper.shape_network import INPUTS as COMPLETION_INPUTS
+from experiments.shape_reconstruction.glance.samples import CompletionProfile
+from harness.authoring.network_program import (
+    DEVICES,
+    chosen_networks,
+    chosen_profile,
+    device_of,
+    exit_code,
+    require_torch,
+    training_parser,
+    write_network,
+)
+from harness.basics.errors import WrongUse
 
 
 @dataclass(frozen=True)
@@ -52,66 +55,42 @@ SIZE_AMOUNTS = MappingProxyType(
         ),
     }
 )
+"""As published, and one that shows in a minute that all of it runs."""
+
 COMPLETION_AMOUNTS = MappingProxyType(
     {"paper-smoke": CompletionProfile(26, 1, 2, 4), "paper": CompletionProfile(2600, 8, 6000, 32, 4096)}
 )
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Make the samples, fit, print what is reached on shapes that were held out, write."""
-    options = _parser().parse_args(arguments)
-    names = tuple(SIZE_INPUTS if options.of == "scale" else COMPLETION_INPUTS)
-    if unknown := [name for name in options.only or () if name not in names]:
-        return _refused(f"{options.of} has no network {unknown[0]}; it has {', '.join(names)}")
-    if find_spec("torch") is None:
-        return _refused("networks need torch to be trained: pip install '.[author]'")
-    from experiments.shape_reconstruction.pcn.training.device import device_of  # needs torch
+    """Make the samples, fit, print the errors on held-out shapes, write."""
+    parser = training_parser(str(__doc__), "paper")
+    parser.add_argument("of", choices=("scale", "shape"), help="which table's networks")
+    parser.add_argument("--device", choices=DEVICES, default="auto", help="device that fits completion")
+    return exit_code(partial(_train, parser.parse_args(arguments)))
 
+
+def _train(options: argparse.Namespace) -> None:
+    if options.to is None:
+        raise WrongUse("none of the paper's networks ships: add --to FOLDER")
+    scale = options.of == "scale"
+    sizes = chosen_profile(options.profile, SIZE_AMOUNTS)
+    names = chosen_networks(options.only, tuple(SIZE_INPUTS if scale else COMPLETION_INPUTS))
+    require_torch()
     device = device_of(options.device)
-    if device is None:
-        return _refused("torch finds no CUDA device here; leave --device out, or say --device cpu")
-    options.to.mkdir(parents=True, exist_ok=True)
-    for name in (name for name in names if not options.only or name in options.only):
-        began, cpu = time.perf_counter(), time.process_time()
-        data, card = _trained(name, options, device)
-        card["profile"], card["seconds"] = options.profile, round(time.perf_counter() - began, 1)
-        card["cpu_seconds"] = round(time.process_time() - cpu, 1)
-        (options.to / f"{name}.onnx").write_bytes(data)
-        (options.to / f"{name}.json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
-        sys.stdout.write(f"{name}: {json.dumps({key: card[key] for key in ('held_out', 'seconds')})}\n")
-    return 0
-
-
-def _trained(name: str, options: argparse.Namespace, device: str) -> tuple[bytes, dict[str, Any]]:
     # Both need torch.
-    if options.of == "scale":
+    if scale:
         from experiments.paper.scale_training import train_paper_network
 
-        return train_paper_network(name, SIZE_AMOUNTS[options.profile], options.seed, options.processes)
-    from experiments.shape_reconstruction.pcn.training.paper.train_paper import train_paper_completion
+        train = partial(train_paper_network, amounts=sizes)
+    else:
+        from experiments.paper.shape_training import train_paper_completion
 
-    amounts = COMPLETION_AMOUNTS[options.profile]
-    return train_paper_completion(name, amounts, options.seed, options.processes, device)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("of", choices=("scale", "shape"), help="which table's networks")
-    parser.add_argument("--profile", choices=PROFILES, default="paper")
-    parser.add_argument("--only", action="append", help="one network; again for more than one")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--processes", type=int, default=own_cores(), help="that make samples")
-    parser.add_argument(
-        "--device", choices=("auto", "cpu", "cuda"), default="auto",
-        help="that fits completion; auto: cuda where there is one",
-    )  # fmt: skip
-    parser.add_argument("--out", "--to", dest="to", type=Path, required=True, help="a folder")
-    return parser
-
-
-def _refused(why: str) -> int:
-    sys.stderr.write(f"{why}\n")
-    return 2
+        amounts = COMPLETION_AMOUNTS[options.profile]
+        train = partial(train_paper_completion, amounts=amounts, device=device)
+    for name in names:
+        one = partial(train, name, seed=options.seed, processes=options.processes)
+        write_network(name, one, options.to, options.profile)
 
 
 if __name__ == "__main__":

@@ -87,8 +87,6 @@ class ShapeEvidence:
     place_error: float  #: m, one standard deviation per axis of where on the support the object was put.
     support_error: float  #: m, one standard deviation of the support's height.
     largest: float  #: m, no side of the object is longer.
-    library: str | None = None
-    """folder of known shapes, of which it may be one; None for those that come with the program."""
     supposed: FloatArray = field(default_factory=lambda: read_only(np.zeros((0, 3))))
     """``(n, 3)`` m where the surface is supposed to be, by what was learnt from other objects; no reading,
     and none unless an estimator asks for them."""

@@ -1,15 +1,29 @@
 """Shape reconstruction as an experiment: what does an object never seen look like?"""
 
+from dataclasses import replace
+
 from experiments.shape_reconstruction.answer import ShapeAnswering
+from experiments.shape_reconstruction.cells import CHOICES, MORE_OBJECTS, cells, scene_of
 from experiments.shape_reconstruction.dials import KNOBS, OWN
 from experiments.shape_reconstruction.explorer import performer, plan, smallest_error, steps_of
 from experiments.shape_reconstruction.report import write
 from experiments.shape_reconstruction.result import lines_of, result_of, write_files
 from experiments.shape_reconstruction.section import ShapeRun
-from experiments.shape_reconstruction.table import MEASUREMENT, NAME
-from harness.experiment.experiment import Experiment
-from harness.experiment.plain import plain_budgets
+from harness.experiment.experiment import Experiment, MeasuredCondition
+from harness.experiment.plain import PlainPerforms, plain_budgets, plain_measurement
 from harness.skills.exploring.exploration import PLAN_KEY
+
+NAME = "shape-reconstruction"
+
+MEASUREMENT = replace(
+    plain_measurement(NAME, *OWN),
+    conditions=(MeasuredCondition("choose", CHOICES, ("planned",), ("planned",)),),
+    cells=cells,
+    performed=PlainPerforms(NAME, scene_of),
+    counts=(9, 17, 33),
+    gross=10.0e-3,
+    subjects=MORE_OBJECTS,
+)
 
 EXPERIMENT = Experiment(
     name=NAME,

@@ -2,7 +2,6 @@
 
 import math
 from functools import cached_property, partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -68,9 +67,9 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
     those before are read.
 
     Raises:
-        WrongUse: nothing is to be read; there is no such folder of known shapes; the scene names networks
-            that only a table uses; or it says where the mesh file's origin is, which says nothing of where an
-            unknown object touches its support.
+        WrongUse: nothing is to be read; the scene names networks or meshes that only a table uses; or it
+            states the origin of the mesh file, which does not determine where an unknown object touches its
+            support.
     """
     if steps_of(scene) == 0:
         raise WrongUse("nothing is to be read: ask for vision, for presses, or for both")
@@ -79,17 +78,12 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
             'an unknown object stands where its bottom is: set object.pose.anchor = "bottom", and its '
             "position to where its middle should be on the support"
         )
-    library = scene.section(ShapeRun).library
-    if library is not None and not Path(library).is_dir():
-        raise WrongUse(
-            f"[shape] library = {library!r}: there is no such folder; name one that holds meshes or "
-            "ObjectFiles, or leave the key out"
-        )
-    if scene.section(ShapeRun).pcn is not None:
-        raise WrongUse(
-            "[shape] pcn adds rows to a table and is not used by a run; leave it out of the scene, or "
-            "measure with: touchstone tables shape-reconstruction --set pcn=FOLDER"
-        )
+    for key in ("library", "pcn"):
+        if getattr(scene.section(ShapeRun), key) is not None:
+            raise WrongUse(
+                f"[shape] {key} is for rows of a table and is not used by a run; leave it out of the scene, "
+                f"or measure with: touchstone tables shape-reconstruction --set {key}=FOLDER"
+            )
     settings, looks = scene.section(ShapeRun), scene.sensors.camera
     if settings.choose != "planned" or _presses(scene) == 0:
         place = np.array(scene.object.pose.position)

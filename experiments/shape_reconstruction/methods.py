@@ -1,73 +1,61 @@
-"""Estimators of shape by their names: levels of the dial ``shape.method``."""
+"""Estimators of shape by their names: levels of the knob ``shape.method``."""
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from functools import partial
 
-from experiments.shape_reconstruction.estimators.ellipsoid import by_ellipsoid
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
-from experiments.shape_reconstruction.estimators.plain_bodies import by_box, by_hull, by_visual_hull
-from experiments.shape_reconstruction.estimators.point_answer import PointEstimate, by_raw_points
 from experiments.shape_reconstruction.estimators.stated_space import require_stated_size, require_stated_space
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
 from experiments.shape_reconstruction.fusion.reconstruct import reconstruct, reconstruct_with_prior
-from experiments.shape_reconstruction.pcn.completed_surface import by_completed_surface
-from experiments.shape_reconstruction.pcn.glance import by_glance
-from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
-from experiments.shape_reconstruction.pcn.network import by_completion
-from experiments.shape_reconstruction.retrieval.known_shapes import by_known_shapes
+from experiments.shape_reconstruction.glance.surface import by_glanced_surface
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, OutOfDomain
+from harness.effects.accuracy import Level
 
-METHODS: Mapping[str, Callable[[ShapeEvidence], ShapeEstimate]] = {
-    "box": by_box,
-    "ellipsoid": by_ellipsoid,
-    "hull": by_hull,
-    "visual-hull": by_visual_hull,
+Method = Callable[[ShapeEvidence], ShapeEstimate]
+
+METHODS: Mapping[str, Method] = {
     "glance": by_glanced_surface,
     "rbf": by_hermite,
-    "pcn": by_completed_surface,
     "family-coarse": partial(reconstruct_with_prior, settings=LEVELS["coarse"]),
-    "retrieval": by_known_shapes,
     "family": reconstruct_with_prior,
     "family-fine": partial(reconstruct_with_prior, settings=LEVELS["fine"]),
 }
-"""From cheap to dear: a box takes 10 ms, the family some seconds."""
+"""From cheap to expensive: the first takes 0.2 s, the last half a minute."""
 
-POINTS: Mapping[str, Callable[[ShapeEvidence], PointEstimate]] = {
-    "raw points": by_raw_points,
-    "glance": by_glance,
-    "pcn": by_completion,
+REMOVED: Mapping[Level, str] = {
+    "box": "rbf",
+    "ellipsoid": "rbf",
+    "hull": "rbf",
+    "visual-hull": "glance",
+    "pcn": "family",
+    "retrieval": "family",
 }
-"""Those that answer in points, as a table scores them; of these, the networks have a surface too."""
+"""Methods of earlier versions, each with the one that replaces it."""
 
 QUICK, BEST = "rbf", "family"
-"""While the arm waits for the next press; by default."""
+"""The method between two presses, and the default."""
 
 
-def estimated(method: str, evidence: ShapeEvidence) -> ShapeEstimate:
-    """The shape by a method.
+def estimated(method: str, evidence: ShapeEvidence, methods: Mapping[str, Method] = METHODS) -> ShapeEstimate:
+    """Reconstruct the shape by a method.
 
     Args:
-        method: a key of ``METHODS``.
-        evidence: of a run.
+        method: key of ``methods``.
+        evidence: readings of a run.
+        methods: estimators by name.
 
     Raises:
-        WrongUse: the folder of known shapes is not there, or holds none.
-        FitRefused: the readings say too little for it, contradict each other, or contradict the size and the
-            place that the scene states.
+        FitRefused: the readings are too few for the method, contradict each other, or contradict the size
+            and the place that the scene states.
     """
     if evidence.look is None and not evidence.contacts:
         raise FitRefused(
             f"the object was not seen, and {len(evidence.touches)} ways of the gel met nothing; check where "
             "it stands and where the camera looks, or press again"
         )
-    require_stated_space(evidence)
-    with _refusing():
-        found = METHODS[method](evidence)
-    require_stated_size(found.mesh, evidence, method)
-    return found
+    return _within_stated_space(methods[method], evidence, method)
 
 
 def continued(
@@ -83,27 +71,17 @@ def continued(
     Raises:
         FitRefused: as ``estimated``.
     """
+    return _within_stated_space(
+        lambda readings: reconstruct(readings, settings, previous), evidence, "family"
+    )
+
+
+def _within_stated_space(method: Method, evidence: ShapeEvidence, name: str) -> ShapeEstimate:
+    """Reconstruct the shape; refuse readings and answers that contradict the stated place and size."""
     require_stated_space(evidence)
-    with _refusing():
-        found = reconstruct(evidence, settings, previous)
-    require_stated_size(found.mesh, evidence, "family")
-    return found
-
-
-def pointed(method: str, evidence: ShapeEvidence) -> PointEstimate:
-    """Places of the shape's surface by a method, a key of ``POINTS``.
-
-    Raises:
-        FitRefused: the readings say too little for it.
-    """
-    with _refusing():
-        return POINTS[method](evidence)
-
-
-@contextmanager
-def _refusing() -> Iterator[None]:
-    """Readings outside of what a method is made for are a refusal of its answer."""
     try:
-        yield
+        found = method(evidence)
     except OutOfDomain as error:
         raise FitRefused(str(error)) from error
+    require_stated_size(found.mesh, evidence, name)
+    return found

@@ -2,7 +2,7 @@
 
 The main number goes from samples to surfaces, each sample to the nearest place of the other's triangles, and
 is zero for the truth itself. The published form goes from points to points and is not: two samplings of one
-surface are some millimetres apart (``published_floor``). ``band_held`` tests the stated deviation.
+surface are a millimetre or two apart. ``band_held`` tests the stated deviation.
 """
 
 from dataclasses import dataclass
@@ -38,10 +38,21 @@ class ShapeError:
     """m, half the sum of ``accuracy`` and ``completeness`` (Chamfer-L1, distances not squared)."""
     accuracy: float  #: m, mean distance from the answer to the truth.
     completeness: float  #: m, mean distance from the truth to the answer.
-    touchable_completeness: float | None
-    """m, the same from those of the truth's faces that a gel can come to; None where nobody said which."""
     f_score: float  #: 0 to 1, harmonic mean of the shares that are within ``F_SCORE_WITHIN``.
     hausdorff95: float  #: m, the greater of the two distances that 95 % of each surface are within.
+
+    @classmethod
+    def of(cls, towards_truth: FloatArray, towards_answer: FloatArray) -> "ShapeError":
+        """Summarise distances from samples of the answer to the truth, and back, m."""
+        accuracy, completeness = float(towards_truth.mean()), float(towards_answer.mean())
+        precise, found = (float((d <= F_SCORE_WITHIN).mean()) for d in (towards_truth, towards_answer))
+        return cls(
+            chamfer=0.5 * (accuracy + completeness),
+            accuracy=accuracy,
+            completeness=completeness,
+            f_score=2.0 * precise * found / (precise + found) if precise + found > 0.0 else 0.0,
+            hausdorff95=float(max(np.quantile(d, _FAR) for d in (towards_truth, towards_answer))),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +69,7 @@ class SurfacesApart:
     @property
     def error(self) -> ShapeError:
         """How far apart they are."""
-        return _summed(self.towards_truth, self.towards_answer, None)
+        return ShapeError.of(self.towards_truth, self.towards_answer)
 
 
 @dataclass(frozen=True)
@@ -82,77 +93,38 @@ def surfaces_apart(answer: Mesh, truth: Mesh, samples: int = SAMPLES, seed: int 
         MeshRefused: a surface without area or with vertices that are not finite.
     """
     for mesh, whose in ((answer, "answer"), (truth, "truth")):
-        _require_surface(mesh, whose)
+        if len(mesh.faces) == 0 or not np.isfinite(mesh.vertices).all():
+            bad = np.count_nonzero(~np.isfinite(mesh.vertices).all(axis=1))
+            raise MeshRefused(
+                f"the {whose} has {len(mesh.faces)} faces and {bad} vertices that are not finite; distances "
+                "need one face or more and finite vertices"
+            )
     points, faces = random_points(answer, samples, np.random.default_rng(seed))
-    true = _sampled(truth, samples, seed)
+    true = random_points(truth, samples, np.random.default_rng(seed))[0]
     nearest, nearest_faces = NearestSurface(answer).places(true)
     return SurfacesApart(
         answer=points,
         answer_faces=faces,
-        towards_truth=_to_surface(points, truth),
+        towards_truth=NearestSurface(truth).distances(points),
         nearest=nearest,
         nearest_faces=nearest_faces,
         towards_answer=np.asarray(np.linalg.norm(nearest - true, axis=1)),
     )
 
 
-def shape_error(
-    answer: Mesh, truth: Mesh, touchable: Mesh | None = None, samples: int = SAMPLES, seed: int = 0
-) -> ShapeError:
-    """An answer with a surface, against the truth.
-
-    Args:
-        answer: m, in the truth's frame.
-        truth: m, its whole surface, the inner walls of a vessel too.
-        touchable: those faces of the truth that can be touched.
-        samples: on each surface, even by area.
-        seed: of the samples; both surfaces are sampled alike, so that swapping them changes nothing.
-
-    Raises:
-        MeshRefused: a surface without area or with vertices that are not finite.
-    """
-    apart = surfaces_apart(answer, truth, samples, seed)
-    reached = None
-    if touchable is not None:
-        _require_surface(touchable, "touchable part of the truth")
-        reached = float(_to_surface(_sampled(touchable, samples, seed), answer).mean())
-    return _summed(apart.towards_truth, apart.towards_answer, reached)
-
-
-def points_error(answer: FloatArray, truth: Mesh, samples: int = SAMPLES, seed: int = 0) -> ShapeError:
-    """An answer of ``(n, 3)`` points m, against the truth: from points to surface, from samples to points.
-
-    Raises:
-        OutOfDomain: no point, or one that is not finite.
-        MeshRefused: as ``shape_error``.
-    """
-    _require_surface(truth, "truth")
-    _require_points(answer)
-    towards_answer = cKDTree(answer).query(_sampled(truth, samples, seed))[0]
-    return _summed(_to_surface(answer, truth), np.asarray(towards_answer), None)
+def shape_error(answer: Mesh, truth: Mesh, samples: int = SAMPLES, seed: int = 0) -> ShapeError:
+    """Measure how far an answer is from the truth; as ``surfaces_apart``."""
+    return surfaces_apart(answer, truth, samples, seed).error
 
 
 def published_chamfer(answer: Mesh, truth: Mesh, count: int = PUBLISHED_POINTS, seed: int = 0) -> float:
-    """M: Chamfer-L1 from points to points, each surface sampled on its own; see ``published_floor``."""
+    """Measure the Chamfer-L1 distance from points to points, each surface sampled on its own, m."""
     streams = np.random.SeedSequence(seed).spawn(2)
     first, second = (
         random_points(mesh, count, np.random.default_rng(stream))[0]
         for mesh, stream in zip((answer, truth), streams, strict=True)
     )
     return published_points_chamfer(first, second)
-
-
-def published_from_points(
-    answer: FloatArray, truth: Mesh, count: int = PUBLISHED_POINTS, seed: int = 0
-) -> float:
-    """M: the published form of an answer of ``(n, 3)`` points m, as many as it has.
-
-    Raises:
-        OutOfDomain: no point, or one that is not finite.
-        MeshRefused: as ``shape_error``.
-    """
-    _require_surface(truth, "truth")
-    return published_points_chamfer(answer, _sampled(truth, count, seed))
 
 
 def published_points_chamfer(first: FloatArray, second: FloatArray) -> float:
@@ -162,53 +134,13 @@ def published_points_chamfer(first: FloatArray, second: FloatArray) -> float:
         OutOfDomain: no point on one side, or one that is not finite.
     """
     for points in (first, second):
-        _require_points(points)
+        if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0 or not np.isfinite(points).all():
+            raise OutOfDomain(
+                f"points of shape {points.shape} are no answer; give (n, 3) finite numbers in metres, "
+                "one row or more"
+            )
     there, back = cKDTree(second).query(first)[0], cKDTree(first).query(second)[0]
     return 0.5 * float(np.mean(there) + np.mean(back))
-
-
-def published_floor(truth: Mesh, count: int = PUBLISHED_POINTS, seed: int = 0) -> float:
-    """M: the published form between two samplings of one surface, which no answer can be expected to beat."""
-    return published_chamfer(truth, truth, count, seed)
-
-
-def _sampled(mesh: Mesh, count: int, seed: int) -> FloatArray:
-    return random_points(mesh, count, np.random.default_rng(seed))[0]
-
-
-def _to_surface(points: FloatArray, mesh: Mesh) -> FloatArray:
-    """``(n,)`` m to the nearest place of any triangle."""
-    return NearestSurface(mesh).distances(points)
-
-
-def _summed(towards_truth: FloatArray, towards_answer: FloatArray, reached: float | None) -> ShapeError:
-    accuracy, completeness = float(towards_truth.mean()), float(towards_answer.mean())
-    precise, found = (float((apart <= F_SCORE_WITHIN).mean()) for apart in (towards_truth, towards_answer))
-    return ShapeError(
-        chamfer=0.5 * (accuracy + completeness),
-        accuracy=accuracy,
-        completeness=completeness,
-        touchable_completeness=reached,
-        f_score=2.0 * precise * found / (precise + found) if precise + found > 0.0 else 0.0,
-        hausdorff95=float(max(np.quantile(apart, _FAR) for apart in (towards_truth, towards_answer))),
-    )
-
-
-def _require_surface(mesh: Mesh, whose: str) -> None:
-    if len(mesh.faces) == 0 or not np.isfinite(mesh.vertices).all():
-        bad = np.count_nonzero(~np.isfinite(mesh.vertices).all(axis=1))
-        raise MeshRefused(
-            f"the {whose} has {len(mesh.faces)} faces and {bad} vertices that are not finite; distances need "
-            "one face or more and finite vertices"
-        )
-
-
-def _require_points(points: FloatArray) -> None:
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0 or not np.isfinite(points).all():
-        raise OutOfDomain(
-            f"points of shape {points.shape} are no answer; give (n, 3) finite numbers in metres, one row or "
-            "more"
-        )
 
 
 BAND90 = 1.645

@@ -66,7 +66,6 @@ class ShapeReadings:
             place_error=settings.place_error,
             support_error=settings.support_error,
             largest=settings.largest,
-            library=settings.library,
             errors=self.run.station.errors,
         )
 

@@ -48,8 +48,8 @@ class ShapeRun(Section):
     """m: a run ends when the mean deviation that the estimate claims is no greater, whatever presses are
     left; None to make them all."""
     library: str | None = None
-    """folder of meshes or ObjectFiles that ``shape.method = "retrieval"`` chooses among; None for household
-    shapes that come with the program."""
+    """folder of meshes or ObjectFiles that the row ``retrieval`` of a table chooses among; None for household
+    shapes that come with the program. A run does not use it."""
     pcn: str | None = None
     """folder of the paper's own networks (``experiments.paper.train``), whose rows a table shows beside ours;
     a run does not use it."""

@@ -45,6 +45,7 @@ EXPERIMENTS: dict[str, ExperimentRow] = {
         value="experiments.shape_reconstruction.experiment:EXPERIMENT",
         section="shape",
         model="experiments.shape_reconstruction.section:ShapeRun",
+        tables="experiments.paper.shape_table:TABLE",
     ),
     "calibrate-taxim": ExperimentRow(
         about="How does a tactile camera's gel turn slope into colour?", command="calibrate taxim"

@@ -24,7 +24,7 @@ SAME_SURFACE = 0.5e-3
 
 
 PRESSES = {"bowl": "8"}
-"""Of those that four blind presses mostly meet with the housing: too few contacts have no hull."""
+"""Of those that four blind presses mostly meet with the housing: too few contacts bound no surface."""
 
 
 def surfaces(result: dict[str, Any]) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def surfaces(result: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.slow  # the same run in process is in test_shape_run.py
 def test_a_run_looks_presses_and_answers_and_is_replayed_to_the_same(tmp_path: Path) -> None:
     arguments = ["run", "shape-reconstruction", "--object", "builtin:mug", "--presses", "2", "--seed", "0"]
-    arguments += ["--level", "shape.method=hull", "--bench", "wires"]
+    arguments += ["--level", "shape.method=rbf", "--bench", "wires"]
     code, result = RunProcess([*arguments, "--out", str(tmp_path / "run")], tmp_path).finish(240.0)
     assert code == 0
     assert result["mock"]
@@ -45,7 +45,7 @@ def test_a_run_looks_presses_and_answers_and_is_replayed_to_the_same(tmp_path: P
     assert (tmp_path / "run" / fused["mesh"]).is_file()
     assert Path(result["report"]).is_file()
     again = RunProcess(
-        ["replay", str(tmp_path / "run"), "--level", "shape.method=hull", "--out", str(tmp_path / "again")],
+        ["replay", str(tmp_path / "run"), "--level", "shape.method=rbf", "--out", str(tmp_path / "again")],
         tmp_path,
     )
     code, replayed = again.finish(100.0)
@@ -67,7 +67,7 @@ def test_each_object_over_every_wire_is_what_it_is_in_process(name: str, tmp_pat
         "--seed",
         "0",
     ]
-    arguments += ["--set", "choose=random", "--level", "shape.method=hull"]
+    arguments += ["--set", "choose=random", "--level", "shape.method=rbf"]
     results = []
     for bench in ("wires", "in-process"):
         out = ["--bench", bench, "--out", str(tmp_path / bench)]

@@ -8,20 +8,25 @@ torch: ``pip install '.[author]'``. Modes that were solved are kept, so that a r
 import argparse
 import json
 import sys
-import time
 from dataclasses import dataclass
-from importlib.util import find_spec
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
 from experiments.scale_estimation.unseen.training.outlines import train_outlines
 from experiments.scale_estimation.unseen.training.real_shapes import train_real_shapes
-from harness.basics.cores import own_cores
+from harness.authoring.network_program import (
+    chosen_networks,
+    chosen_profile,
+    exit_code,
+    require_torch,
+    training_parser,
+    write_network,
+)
 
 NETWORKS = ("sound", "touch", "imprints")
 REAL_SHAPES = "real-shapes"
 SENSES = ("outline", *NETWORKS, REAL_SHAPES)
-WITHOUT_TORCH = ("outline", REAL_SHAPES)
 
 
 @dataclass(frozen=True)
@@ -46,26 +51,29 @@ PROFILES = MappingProxyType(
 
 def main(arguments: list[str] | None = None) -> int:
     """Make the samples, fit, print what is reached on shapes that were held out, write."""
-    options = _parser().parse_args(arguments)
-    if options.profile not in PROFILES:
-        return _refused(
-            f"there is no profile {options.profile}; there are {', '.join(PROFILES)}. The paper's networks "
-            "are trained by python -m experiments.paper.train scale --to FOLDER"
-        )
-    senses = tuple(sense for sense in SENSES if not options.only or sense in options.only)
-    fitted = tuple(sense for sense in senses if sense not in WITHOUT_TORCH)
-    if find_spec("torch") is None and fitted:
-        return _refused("networks need torch: pip install '.[author]', or add --only outline")
+    parser = training_parser(str(__doc__), "standard")
+    parser.add_argument("--meshes", type=Path, help="folder of scanned things, for real-shapes")
+    return exit_code(partial(_train, parser.parse_args(arguments)))
+
+
+def _train(options: argparse.Namespace) -> None:
+    paper = "; the paper's networks: python -m experiments.paper.train scale --to FOLDER"
+    profile = chosen_profile(options.profile, PROFILES, paper)
+    senses = chosen_networks(options.only, SENSES)
+    fitted = [sense for sense in senses if sense in NETWORKS]
+    if fitted:
+        require_torch(", or add --only outline")
     folder: Path = options.to or Path(__file__).parent / "data"
     folder.mkdir(parents=True, exist_ok=True)
     if "outline" in senses:
-        profile = PROFILES[options.profile]
         sys.stdout.write(train_outlines(profile.outlines, options.seed, folder) + "\n")
     for sense in fitted:
-        _train(sense, options, folder)
+        from experiments.scale_estimation.unseen.training.train_network import train_network  # needs torch
+
+        train = partial(train_network, sense, profile, options.seed, options.processes)
+        write_network(sense, train, folder, options.profile)
     if REAL_SHAPES in senses:
         _widen(options, folder)
-    return 0
 
 
 def _widen(options: argparse.Namespace, folder: Path) -> None:
@@ -76,38 +84,6 @@ def _widen(options: argparse.Namespace, folder: Path) -> None:
     widths = train_real_shapes(options.meshes, options.seed)
     (folder / "real_shapes.json").write_text(json.dumps(widths, indent=1) + "\n", encoding="utf-8")
     sys.stdout.write(f"real shapes: {json.dumps(widths)}\n")
-
-
-def _train(sense: str, options: argparse.Namespace, folder: Path) -> None:
-    """One network with its card, written."""
-    # It needs torch.
-    from experiments.scale_estimation.unseen.training.train_network import train_network
-
-    began = time.perf_counter()
-    data, card = train_network(sense, PROFILES[options.profile], options.seed, options.processes)
-    card["profile"], card["seconds"] = options.profile, round(time.perf_counter() - began, 1)
-    (folder / f"{sense}.onnx").write_bytes(data)
-    (folder / f"{sense}.json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
-    reached = {name: card[name] for name in ("held_out", "seconds")}
-    sys.stdout.write(f"{sense}: {json.dumps(reached)}\n")
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--profile", default="standard", help=" or ".join(PROFILES))
-    parser.add_argument("--only", choices=SENSES, action="append", help="again for more than one")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--processes", type=int, default=own_cores(), help="that make samples")
-    parser.add_argument("--meshes", type=Path, help="folder of scanned things, for real-shapes")
-    parser.add_argument(
-        "--out", "--to", dest="to", type=Path, help="a folder; left out, where the program has its own"
-    )
-    return parser
-
-
-def _refused(why: str) -> int:
-    sys.stderr.write(f"{why}\n")
-    return 2
 
 
 if __name__ == "__main__":

@@ -15,9 +15,8 @@ from experiments.shape_reconstruction.estimators.grid import Grid
 from experiments.shape_reconstruction.estimators.knowledge import known_by, limited_sides, not_bounded
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.fusion.acceptance import Candidate, folds_of
-from experiments.shape_reconstruction.pcn.completed_surface import closing_field
-from experiments.shape_reconstruction.pcn.glance import shipped, silhouette_to_glance_at
-from experiments.shape_reconstruction.pcn.glanced_surface import BLUR, GAP, prior_deviation
+from experiments.shape_reconstruction.glance.network import shipped, silhouette_to_glance_at
+from experiments.shape_reconstruction.glance.surface import BLUR, closing_field, prior_deviation
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray, IntArray, read_only
 
@@ -102,7 +101,7 @@ def _prior_distance(look: SeenMask) -> tuple[Grid, FloatArray, float]:
     The estimates of a run share one picture: its prior is kept.
     """
     points = shipped().points(look)
-    grid, closing = closing_field(points, GAP, BLUR, MARGIN)
+    grid, closing = closing_field(points, MARGIN)
     inside = closing.reshape(grid.shape) < 0.0
     apart = ndimage.distance_transform_edt(~inside) - ndimage.distance_transform_edt(inside)
     signed = grid.pitch * (apart - 0.5 * np.sign(apart))

@@ -35,8 +35,8 @@ from experiments.shape_reconstruction.fusion.acceptance import (
     rejection_reason,
 )
 from experiments.shape_reconstruction.fusion.bent_prior import bend_prior
-from experiments.shape_reconstruction.pcn.glance import with_supposed
-from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
+from experiments.shape_reconstruction.glance.network import with_supposed
+from experiments.shape_reconstruction.glance.surface import by_glanced_surface
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, OutOfDomain

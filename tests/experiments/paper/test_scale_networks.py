@@ -258,7 +258,7 @@ def test_the_command_line_of_the_paper_s_profile_is_refused_in_words(
     assert "picture, spectrogram, imprints" in capsys.readouterr().err
     assert own.main(["--profile", "paper", *to]) == 2
     assert "experiments.paper.train scale --to FOLDER" in capsys.readouterr().err
-    monkeypatch.setattr("experiments.paper.train.find_spec", lambda _name: None)
+    monkeypatch.setattr("harness.authoring.network_program.find_spec", lambda _name: None)
     assert main(["scale", *to]) == 2
     assert "torch" in capsys.readouterr().err
     assert not (tmp_path / "none").exists()

@@ -63,7 +63,7 @@ def test_modes_go_with_size_and_material_and_are_continued_at_their_spacing() ->
 def test_without_torch_outlines_are_fitted_and_the_rest_says_what_it_needs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("experiments.scale_estimation.unseen.train.find_spec", lambda _name: None)
+    monkeypatch.setattr("harness.authoring.network_program.find_spec", lambda _name: None)
     assert main(["--profile", "smoke", "--out", str(tmp_path / "none")]) == 2
     assert "torch" in capsys.readouterr().err
     assert not (tmp_path / "none").exists()

@@ -8,14 +8,19 @@ import numpy as np
 import pytest
 import trimesh
 
+from experiments.shape_reconstruction.glance.network import (
+    GIVEN,
+    SIDE,
+    opened,
+    shipped,
+    silhouette_to_glance_at,
+)
+from experiments.shape_reconstruction.glance.surface import PITCH, by_glanced_surface, closed_around
+from experiments.shape_reconstruction.glance.train import main
 from experiments.shape_reconstruction.methods import estimated
-from experiments.shape_reconstruction.metric import points_error, surfaces_apart
-from experiments.shape_reconstruction.pcn.glance import by_glance, opened, shipped
-from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
-from experiments.shape_reconstruction.pcn.point_frame import GIVEN
-from experiments.shape_reconstruction.pcn.train import main
-from experiments.shape_reconstruction.pcn.window import SIDE
+from experiments.shape_reconstruction.metric import surfaces_apart
 from harness.basics.errors import DataRefused, FitRefused
+from harness.basics.faces.mesh_rays import is_inside
 from harness.basics.geometry import rotation_about, transform
 from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
@@ -28,7 +33,6 @@ UP = np.array([0.0, 0.0, 1.0])
 def test_one_look_is_nearer_than_a_centimetre_to_what_was_never_drawn(name: str) -> None:
     mesh = build(name, 6e-3)
     seen = evidence_of((), look_at(mesh))
-    assert points_error(by_glance(seen).points, mesh, 3000).chamfer < 10e-3
     found = by_glanced_surface(seen)
     assert surfaces_apart(found.mesh, mesh, 3000).error.chamfer < 10e-3
     body = trimesh.Trimesh(found.mesh.vertices, found.mesh.faces)
@@ -54,8 +58,21 @@ def test_what_is_too_large_for_the_network_is_not_glanced_at() -> None:
     large = Mesh(2.5 * large.vertices, large.faces)
     seen = evidence_of((), look_at(large), largest=0.8)
     with pytest.raises(FitRefused, match="looks no farther"):
-        by_glance(seen)
+        by_glanced_surface(seen)
     assert estimated("family", seen).details.get("estimator") != "glance"
+
+
+def test_closing_fills_a_ball_and_leaves_a_bowl_open() -> None:
+    random = np.random.default_rng(0)
+    ball = random.normal(size=(1024, 3))
+    ball *= 0.06 / np.linalg.norm(ball, axis=1)[:, None]
+    ball[:, 2] += 0.06
+    middle = np.array([[0.0, 0.0, 0.045]])
+    solid, bowl = closed_around(ball).mesh, closed_around(ball[ball[:, 2] < 0.05]).mesh
+    assert is_inside(middle, solid.corners)[0]
+    # Walls have a thickness, and nothing is below the support.
+    assert np.ptp(solid.bounds, axis=0) == pytest.approx(0.12 + PITCH * np.array([2, 2, 1]), abs=1e-3)
+    assert not is_inside(middle, bowl.corners)[0]
 
 
 def test_a_silhouette_that_it_does_not_understand_makes_it_less_sure() -> None:
@@ -79,7 +96,7 @@ def test_without_a_silhouette_there_is_no_glance() -> None:
     look = look_at(build("mug", 6e-3))
     for nothing in (None, replace(look, mask=np.zeros_like(look.mask))):
         with pytest.raises(FitRefused, match="let it look again"):
-            by_glance(evidence_of((), nothing))
+            silhouette_to_glance_at(evidence_of((), nothing))
     with pytest.raises(FitRefused):
         estimated("glance", evidence_of((), None))
 
@@ -96,14 +113,18 @@ def test_the_card_says_what_was_held_out() -> None:
         replace(shipped(), card={}).held_out  # noqa: B018 - it is computed
 
 
-def test_a_profile_that_has_no_such_network_says_which_it_has(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--profile", "paper", "--only", "glance"]) == 2
-    assert "touch, picture, both" in capsys.readouterr().err
+def test_what_another_program_trains_is_refused_by_name(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["--profile", "paper"]) == 2
+    assert "experiments.paper.train shape --to FOLDER" in capsys.readouterr().err
+    assert main(["--only", "completion"]) == 2
+    assert "there is no network completion; there are glance" in capsys.readouterr().err
 
 
 def test_a_smoke_training_ends_in_a_graph_that_answers_as_torch_does(tmp_path: Path) -> None:
     torch = pytest.importorskip("torch", reason="the extra 'author' is not installed")
-    from experiments.shape_reconstruction.pcn.training.glance import GlanceNetwork
+    from experiments.shape_reconstruction.glance.training import GlanceNetwork
 
     asked = ["--profile", "smoke", "--only", "glance", "--processes", "1", "--device", "cpu"]
     assert main([*asked, "--out", str(tmp_path)]) == 0

@@ -1,6 +1,5 @@
 """Tests of the stated knowledge of a plain answer and of its unlimited extents."""
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -8,14 +7,10 @@ import pytest
 
 from experiments.shape_reconstruction.estimators.contact_samples import all_samples
 from experiments.shape_reconstruction.estimators.knowledge import (
-    beyond_deviation,
-    known_by,
     limited_sides,
     not_bounded,
 )
-from experiments.shape_reconstruction.estimators.plain_answer import _RATE, _READING, plain_answer
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.surface import SUPPOSED
 from harness.basics.arrays import FloatArray
 from harness.objects.builtin import build
 from tests.experiments.shape_reconstruction.touched import evidence_of, touch_of
@@ -49,21 +44,3 @@ def test_contacts_at_both_ends_bound_an_axis(signs: tuple[int, ...]) -> None:
     evidence = touched((np.array([0.0, 0.0, high]), up), *sides)
     found = not_bounded(limited_sides(MUG, all_samples(evidence), None))
     assert found == (("y",) if len(signs) == 2 else ("x", "y"))
-
-
-def test_a_plain_body_is_as_unsure_as_it_is_far_from_contacts_and_as_its_open_sides_leave_it() -> None:
-    top, up = float(MUG.bounds[1, 2]), np.array([0.0, 0.0, 1.0])
-    evidence = touched((np.array([0.0, 0.0, top]), up))
-    samples = all_samples(evidence)
-    found = plain_answer(evidence, samples, None, MUG, "box", 0.0)
-    far = np.linalg.norm(MUG.vertices[:, None] - samples.points[None], axis=2).min(axis=1)
-    known, sides = known_by(MUG, samples, None), limited_sides(MUG, samples, None)
-    beyond = beyond_deviation(MUG, known, sides, evidence.largest)
-    assert beyond.max() > 40e-3  # x and y may reach as far as the stated size
-    np.testing.assert_allclose(found.deviation**2, (_RATE * far) ** 2 + _READING**2 + beyond**2, rtol=1e-9)
-    bounded = replace(evidence, largest=1e-3)
-    sure = plain_answer(bounded, samples, None, MUG, "box", 0.0).deviation
-    open_side = (known == SUPPOSED) & (MUG.vertex_normals[:, 0] > 0.9)
-    assert (found.deviation[open_side] > 2.0 * sure[open_side]).all()
-    touched_there = far < 1e-3
-    assert sure[touched_there] == pytest.approx(_READING, rel=0.2)

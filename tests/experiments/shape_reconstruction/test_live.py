@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction import running
-from experiments.shape_reconstruction.estimators.plain_bodies import by_box
+from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from experiments.shape_reconstruction.methods import QUICK
@@ -42,7 +42,7 @@ def test_of_few_presses_each_is_shown_and_of_many_those_that_double(made: int, s
 
 def test_each_estimate_is_from_the_presses_until_then_and_none_where_nothing_was_met() -> None:
     missed = replace(TOUCHES[0], points=TOUCHES[0].points[:0], normals=TOUCHES[0].normals[:0])
-    found = list(live_estimates(evidence_of((missed, *TOUCHES[1:])), "box"))
+    found = list(live_estimates(evidence_of((missed, *TOUCHES[1:])), "rbf"))
     assert [one.presses for one in found] == [1, 2, 3, 4]
     assert [len(one.evidence.touches) for one in found] == [1, 2, 3, 4]
     assert found[0].estimate is None
@@ -74,7 +74,7 @@ def test_each_estimate_is_given_that_of_a_press_less(monkeypatch: pytest.MonkeyP
         evidence: ShapeEvidence, _settings: FamilySettings, previous: ShapeEstimate | None
     ) -> ShapeEstimate:
         given.append(previous and previous.details["presses"])
-        return replace(by_box(evidence_of(TOUCHES)), details={"presses": len(evidence.touches)})
+        return replace(by_hermite(evidence_of(TOUCHES)), details={"presses": len(evidence.touches)})
 
     monkeypatch.setattr(running, "continued", continued)
     RunningShape(INFORMATIVE).after(evidence_of(TOUCHES[:3]))

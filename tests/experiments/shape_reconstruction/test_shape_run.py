@@ -285,6 +285,6 @@ def test_a_run_ends_when_the_shape_is_known_as_well_as_was_asked_and_nothing_is_
 def test_readings_of_nothing_are_refused_with_what_to_do_next(blind: Recording) -> None:
     evidence = evidence_of(RunFiles(blind), blind.steps())
     missed = tuple(touch for touch in evidence.touches if not touch.met)
-    for method in ("box", "rbf", "family"):
+    for method in ("rbf", "family"):
         with pytest.raises(FitRefused, match=f"{len(missed)} ways of the gel met nothing; check where"):
             estimated(method, replace(evidence, touches=missed))

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from experiments.shape_reconstruction import methods
-from experiments.shape_reconstruction.estimators.plain_bodies import by_box
+from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.estimators.stated_space import TOO_LONG, longest_side, max_offset
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import estimate as family
@@ -67,33 +67,33 @@ def test_an_outline_above_the_horizon_stands_nowhere() -> None:
     pose = SEEN.look.stand_from_camera.copy()
     pose[2, 3] *= -1.0
     with pytest.raises(FitRefused, match="stands above the horizon"):
-        estimated("visual-hull", replace(SEEN, look=replace(SEEN.look, stand_from_camera=pose)))
+        estimated("glance", replace(SEEN, look=replace(SEEN.look, stand_from_camera=pose)))
 
 
 def test_contacts_away_from_the_stated_place_or_too_far_apart_are_refused() -> None:
     with pytest.raises(FitRefused, match=r"met something 0.3\d m from the stated place; .* within 0.27 m"):
-        estimated("box", away(TOUCHED, np.array([0.32, 0.0])))
+        estimated("rbf", away(TOUCHED, np.array([0.32, 0.0])))
     pair = (TOUCHED.touches[0], away(TOUCHED, np.array([0.26, 0.0])).touches[0])
     with pytest.raises(FitRefused, match=r"contacts are 0.1\d m apart, and \[shape\] largest is 0.15 m"):
-        estimated("box", replace(TOUCHED, touches=pair, largest=0.15, place_error=0.08))
-    assert estimated("box", TOUCHED).mesh.vertices.size
+        estimated("rbf", replace(TOUCHED, touches=pair, largest=0.15, place_error=0.08))
+    assert estimated("rbf", TOUCHED).mesh.vertices.size
 
 
 @pytest.mark.parametrize(("factor", "refused"), [(0.99, False), (1.01, True)])
 def test_an_answer_longer_than_stated_is_refused(
     monkeypatch: pytest.MonkeyPatch, factor: float, refused: bool
 ) -> None:
-    box = by_box(TOUCHED)
-    size = factor * TOO_LONG * TOUCHED.largest / longest_side(box.mesh.vertices)
-    grown = replace(box, mesh=Mesh(size * box.mesh.vertices, box.mesh.faces))
-    monkeypatch.setattr(methods, "METHODS", {"box": lambda _: grown})
+    small = by_hermite(TOUCHED)
+    size = factor * TOO_LONG * TOUCHED.largest / longest_side(small.mesh.vertices)
+    grown = replace(small, mesh=Mesh(size * small.mesh.vertices, small.mesh.faces))
+    box = {"box": lambda _: grown}
     monkeypatch.setattr(methods, "reconstruct", lambda *_: grown)
     if not refused:
-        assert estimated("box", TOUCHED) is grown
+        assert estimated("box", TOUCHED, box) is grown
         assert continued(TOUCHED, CONTINUED, None) is grown
         return
     with pytest.raises(FitRefused, match=r"a body 0.33 m long \(method box\), .* largest is 0.3 m"):
-        estimated("box", TOUCHED)
+        estimated("box", TOUCHED, box)
     with pytest.raises(FitRefused, match=r"0.33 m long \(method family\)"):
         continued(TOUCHED, CONTINUED, None)
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from experiments.paper.shape_samples import TouchedShape
 from experiments.shape_reconstruction.evidence import GuardedTouch, SeenMask, ShapeEvidence
-from experiments.shape_reconstruction.pcn.training.touched_shape import TouchedShape
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import frame_facing, transform

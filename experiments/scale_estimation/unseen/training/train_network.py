@@ -1,10 +1,11 @@
 """One network of a sense: samples, members, temperature, card."""
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
 
+from experiments.scale_estimation.unseen.train import Profile
 from experiments.scale_estimation.unseen.training.fit import (
     densities,
     family_of,
@@ -30,22 +31,7 @@ _TAKES = {
 }
 
 
-class Amounts(Protocol):
-    """What of a profile is used here."""
-
-    @property
-    def shapes(self) -> int: ...  # noqa: D102
-    @property
-    def strikes(self) -> int: ...  # noqa: D102
-    @property
-    def contacts(self) -> int: ...  # noqa: D102
-    @property
-    def epochs(self) -> tuple[int, int]: ...  # noqa: D102
-    @property
-    def members(self) -> int: ...  # noqa: D102
-
-
-def train_network(sense: str, amounts: Amounts, seed: int, processes: int) -> tuple[bytes, dict[str, Any]]:
+def train_network(sense: str, amounts: Profile, seed: int, processes: int) -> tuple[bytes, dict[str, Any]]:
     """The graph's bytes and its card."""
     each = amounts.strikes if sense == "sound" else amounts.contacts
     samples = samples_of(sense, amounts.shapes, each, seed, processes)

@@ -11,7 +11,7 @@ from experiments.shape_reconstruction.family.estimate import family_estimate
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.fusion.bent_prior import bend_prior
 from experiments.shape_reconstruction.fusion.reconstruct import outline_error, predict_left_out
-from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
+from experiments.shape_reconstruction.glance.surface import by_glanced_surface
 from experiments.shape_reconstruction.surface import TOUCHED
 from harness.basics.errors import FitRefused
 from harness.basics.faces.nearest_surface import NearestSurface

@@ -18,7 +18,7 @@ from experiments.shape_reconstruction.fusion.reconstruct import (
     reconstruct,
     reconstruct_with_prior,
 )
-from experiments.shape_reconstruction.pcn.glance import shipped, with_supposed
+from experiments.shape_reconstruction.glance.network import shipped, with_supposed
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, OutOfDomain
 from harness.objects.builtin import build

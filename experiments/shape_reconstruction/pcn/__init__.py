@@ -1,1 +1,0 @@
-"""A point completion network, the paper's own kind: from touched places to points all over the object."""

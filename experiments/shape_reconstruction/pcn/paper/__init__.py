@@ -1,1 +1,0 @@
-"""The network of the paper as published: another training, rows of a table; none ships."""

@@ -1,1 +1,0 @@
-"""What is needed to train the point completion network, and not to run it."""

@@ -1,0 +1,126 @@
+"""Parts shared by the programs that train networks: options, refusals, and the files that they write."""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, TypeVar
+
+from harness.basics.cores import own_cores
+from harness.basics.errors import WrongUse
+
+DEVICES = ("auto", "cpu", "cuda")
+"""Processors that a network is fitted on; ``"auto"``: cuda where there is one."""
+
+Profile = TypeVar("Profile")
+
+
+def training_parser(description: str, profile: str) -> argparse.ArgumentParser:
+    """Create a parser with the options of every training.
+
+    Args:
+        description: docstring of the program.
+        profile: name of the default profile.
+    """
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument(
+        "--profile", default=profile, help=f"amounts of samples and of the fit; {profile} if left out"
+    )
+    parser.add_argument("--only", action="append", help="one network; may be given again")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--processes", type=int, default=own_cores(), help="processes that make samples")
+    parser.add_argument("--out", "--to", dest="to", type=Path, help="folder of the networks")
+    return parser
+
+
+def exit_code(program: Callable[[], None]) -> int:
+    """Run a program; print why its options are refused."""
+    try:
+        program()
+    except WrongUse as refusal:
+        sys.stderr.write(f"{refusal}\n")
+        return 2
+    return 0
+
+
+def chosen_profile(name: str, profiles: Mapping[str, Profile], advice: str = "") -> Profile:
+    """Return a profile by its name.
+
+    Args:
+        name: name of the profile.
+        profiles: all profiles of the program, by name.
+        advice: where else to look, as the end of a sentence.
+
+    Raises:
+        WrongUse: there is no such profile.
+    """
+    if name not in profiles:
+        raise WrongUse(f"there is no profile {name}; there are {', '.join(profiles)}{advice}")
+    return profiles[name]
+
+
+def chosen_networks(only: list[str] | None, networks: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the networks that ``--only`` names, all of them without it.
+
+    Raises:
+        WrongUse: there is no network of that name.
+    """
+    for name in only or ():
+        if name not in networks:
+            raise WrongUse(f"there is no network {name}; there are {', '.join(networks)}")
+    return tuple(name for name in networks if not only or name in only)
+
+
+def require_torch(advice: str = "") -> None:
+    """Require torch.
+
+    Args:
+        advice: another way out, as the end of a sentence.
+
+    Raises:
+        WrongUse: torch is not installed.
+    """
+    if find_spec("torch") is None:
+        raise WrongUse(f"networks need torch to be trained: pip install '.[author]'{advice}")
+
+
+def device_of(asked: str) -> str:
+    """Return ``"cpu"`` or ``"cuda"``; needs torch.
+
+    Args:
+        asked: one of ``DEVICES``.
+
+    Raises:
+        WrongUse: ``"cuda"`` is asked for, and torch finds no such device.
+    """
+    import torch
+
+    there = torch.cuda.is_available()
+    if asked == "cuda" and not there:
+        raise WrongUse("torch finds no CUDA device here; leave --device out, or say --device cpu")
+    return "cuda" if there and asked != "cpu" else "cpu"
+
+
+def write_network(
+    name: str, train: Callable[[], tuple[bytes, dict[str, Any]]], folder: Path, profile: str
+) -> None:
+    """Train a network, write its graph and its card, and print its errors on held-out shapes.
+
+    Args:
+        name: name of the network and of its two files.
+        train: returns the bytes of the graph, and the card.
+        folder: folder of the files; created if missing.
+        profile: name of the profile, for the card.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    clock, cpu = time.perf_counter(), time.process_time()
+    data, card = train()
+    card["profile"], card["seconds"] = profile, round(time.perf_counter() - clock, 1)
+    card["cpu_seconds"] = round(time.process_time() - cpu, 1)
+    (folder / f"{name}.onnx").write_bytes(data)
+    (folder / f"{name}.json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
+    printed = {key: card[key] for key in ("held_out", "cpu_seconds", "seconds", "device") if key in card}
+    sys.stdout.write(f"{name}: {json.dumps(printed)}\n")
