@@ -9,12 +9,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from harness.basics.errors import FitRefused, TouchstoneError
+from harness.basics.errors import FitRefused, TouchstoneError, WrongUse
 from harness.bench.experiments import EXPERIMENTS
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
-from harness.effects.accuracy import Knob, Level, Setting
+from harness.effects.accuracy import Accuracy, Knob, Level, Setting
 from harness.experiment.experiment import Experiment, Measurement, RunCell, Say, Scored
 from harness.experiment.in_process import performed, recorded
 from harness.experiment.levels import chosen_levels
@@ -203,7 +203,15 @@ def plain_budgets(name: str, steps: Callable[[SceneFile], int], *knobs: Knob[Lev
     def solver(run: RunFiles) -> PlainRun:
         return PlainRun(named(name), run.recording, run.recording.committed)
 
-    return Budgets(solver, {knob.name: knob.levels[-1] for knob in knobs}, steps)
+    def unfit(_scene: SceneFile, setting: Setting) -> str | None:
+        """Return why a setting of a stored curve cannot be answered; None if it can."""
+        try:
+            Accuracy(knobs, setting)
+        except WrongUse as refusal:
+            return f"{refusal}; measure what accuracy costs again: touchstone cost {name}"
+        return None
+
+    return Budgets(solver, {knob.name: knob.levels[-1] for knob in knobs}, steps, unfit=unfit)
 
 
 def _cells(

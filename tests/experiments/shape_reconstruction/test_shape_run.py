@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.shape_reconstruction.dials import METHOD
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.experiment import EXPERIMENT
 from experiments.shape_reconstruction.explorer import ShapeExplorer
-from experiments.shape_reconstruction.methods import QUICK, estimated
+from experiments.shape_reconstruction.methods import METHODS, QUICK, REMOVED, estimated
 from experiments.shape_reconstruction.readings import evidence_of
 from experiments.shape_reconstruction.running import RunningShape
 from experiments.shape_reconstruction.section import ShapeRun
@@ -20,6 +21,7 @@ from harness.basics.geometry import apply
 from harness.basics.mesh import Mesh
 from harness.bench.scene import scene_from_json
 from harness.bench.station_file import Station
+from harness.effects.accuracy import current_levels
 from harness.experiment.answer import finish
 from harness.experiment.begin import begin
 from harness.experiment.truth import read_true_surface
@@ -288,3 +290,15 @@ def test_readings_of_nothing_are_refused_with_what_to_do_next(blind: Recording) 
     for method in ("rbf", "family"):
         with pytest.raises(FitRefused, match=f"{len(missed)} ways of the gel met nothing; check where"):
             estimated(method, replace(evidence, touches=missed))
+
+
+@pytest.mark.parametrize("level", REMOVED)
+def test_a_removed_method_is_refused_and_a_stored_one_is_replaced(level: str) -> None:
+    assert REMOVED[level] in METHODS
+    with pytest.raises(WrongUse, match=f"no longer has the level '{level}'; take {REMOVED[level]}"):
+        METHOD.checked(level)
+    assert current_levels([METHOD], {METHOD.name: level}) == {METHOD.name: REMOVED[level]}
+    assert EXPERIMENT.budgets is not None
+    scene = scene_from_json({"schema": 1, "object": {"mesh": "builtin:mug"}}, "mug")
+    assert "touchstone cost" in str(EXPERIMENT.budgets.unfit(scene, {METHOD.name: level}))
+    assert EXPERIMENT.budgets.unfit(scene, {METHOD.name: QUICK}) is None
