@@ -14,7 +14,7 @@ from experiments.paper.scale_samples import paper_maker
 from experiments.paper.train import SizeAmounts
 from experiments.scale_estimation.unseen import contact_set
 from experiments.scale_estimation.unseen.training.samples import SIZES, SizeSamples, gathered
-from experiments.scale_estimation.unseen.training.train_network import HELD_OUT
+from experiments.scale_estimation.unseen.training.train_network import HELD_OUT, size_errors
 from harness.authoring.resnet import ResNet18, written_linear
 from harness.basics.arrays import FloatArray
 from harness.objectfile.graph import Nodes, float_value
@@ -193,21 +193,8 @@ def train_paper_network(
             "epochs": amounts.epochs[sense],
             "seed": seed,
         },
-        "fitted": _errors(answered_sizes(module, learnt), learnt),
-        "held_out": _errors(answered_sizes(module, tested), tested),
+        "fitted": size_errors(answered_sizes(module, learnt), learnt),
+        "held_out": size_errors(answered_sizes(module, tested), tested),
         "fit_cpu_seconds": round(time.process_time() - began, 1),
     }
     return paper_graph(sense, module), card
-
-
-def _errors(found: FloatArray, samples: SizeSamples) -> dict[str, float]:
-    """In cm, and those of the middle of the range."""
-    error = 1e2 * np.abs(found - samples.sizes)
-    constant = 1e2 * np.abs(np.sqrt(SIZES[0] * SIZES[1]) - samples.sizes)
-    return {
-        "samples": len(samples.sizes),
-        "mean_error_cm": round(float(error.mean()), 2),
-        "median_error_cm": round(float(np.median(error)), 2),
-        "constant_mean_error_cm": round(float(constant.mean()), 2),
-        "constant_median_error_cm": round(float(np.median(constant)), 2),
-    }

@@ -5,15 +5,7 @@ from harness.effects.accuracy import Knob, Level
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
 
-METHOD = Knob(
-    "shape.method",
-    tuple(METHODS),
-    "",
-    "method",
-    BEST,
-    "what makes a surface of the readings",
-    removed=REMOVED,
-)
+METHOD = Knob("shape.method", tuple(METHODS), "", "method", BEST, "estimator of the surface", REMOVED)
 
 OWN: tuple[Knob[Level], ...] = (METHOD,)
 KNOBS: tuple[Knob[Level], ...] = (*OWN, *knobs_of(EFFECTS))

@@ -67,12 +67,22 @@ def train_network(sense: str, amounts: Profile, seed: int, processes: int) -> tu
 
 def _reached(logits: FloatArray, samples: SizeSamples, temperature: float) -> dict[str, float]:
     shares = densities(logits, temperature)
-    error = 1e2 * np.abs(medians(shares) - samples.sizes)
+    return {**size_errors(medians(shares), samples), "held_90": round(held(shares, samples.sizes), 3)}
+
+
+def size_errors(found: FloatArray, samples: SizeSamples) -> dict[str, float]:
+    """Errors of sizes, and of the middle of the range as an answer, in cm.
+
+    Args:
+        found: ``(n,)`` estimated sizes, m.
+        samples: readings of the true sizes.
+    """
+    error = 1e2 * np.abs(found - samples.sizes)
     constant = 1e2 * np.abs(np.sqrt(SIZES[0] * SIZES[1]) - samples.sizes)
     return {
         "samples": len(samples.sizes),
         "mean_error_cm": round(float(error.mean()), 2),
         "median_error_cm": round(float(np.median(error)), 2),
-        "held_90": round(held(shares, samples.sizes), 3),
         "constant_mean_error_cm": round(float(constant.mean()), 2),
+        "constant_median_error_cm": round(float(np.median(constant)), 2),
     }
