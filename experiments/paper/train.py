@@ -22,13 +22,13 @@ from experiments.shape_reconstruction.glance.samples import CompletionProfile
 from harness.authoring.network_program import (
     DEVICES,
     chosen_networks,
-    chosen_profile,
     device_of,
     exit_code,
     require_torch,
     training_parser,
     write_network,
 )
+from harness.authoring.profiles import find_profile
 from harness.basics.errors import WrongUse
 
 
@@ -74,7 +74,7 @@ def _train(options: argparse.Namespace) -> None:
     if options.to is None:
         raise WrongUse("none of the paper's networks ships: add --to FOLDER")
     scale = options.of == "scale"
-    sizes = chosen_profile(options.profile, SIZE_AMOUNTS)
+    sizes = find_profile(SIZE_AMOUNTS, options.profile, "the paper's networks")
     names = chosen_networks(options.only, tuple(SIZE_INPUTS if scale else COMPLETION_INPUTS))
     require_torch()
     device = device_of(options.device)

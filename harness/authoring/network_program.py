@@ -4,18 +4,16 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from harness.basics.cores import own_cores
 from harness.basics.errors import WrongUse
 
 DEVICES = ("auto", "cpu", "cuda")
 """Processors that a network is fitted on; ``"auto"``: cuda where there is one."""
-
-Profile = TypeVar("Profile")
 
 
 def training_parser(description: str, profile: str) -> argparse.ArgumentParser:
@@ -44,22 +42,6 @@ def exit_code(program: Callable[[], None]) -> int:
         sys.stderr.write(f"{refusal}\n")
         return 2
     return 0
-
-
-def chosen_profile(name: str, profiles: Mapping[str, Profile], advice: str = "") -> Profile:
-    """Return a profile by its name.
-
-    Args:
-        name: name of the profile.
-        profiles: all profiles of the program, by name.
-        advice: where else to look, as the end of a sentence.
-
-    Raises:
-        WrongUse: there is no such profile.
-    """
-    if name not in profiles:
-        raise WrongUse(f"there is no profile {name}; there are {', '.join(profiles)}{advice}")
-    return profiles[name]
 
 
 def chosen_networks(only: list[str] | None, networks: tuple[str, ...]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ Profile = TypeVar("Profile")
 
 
 def find_profile(
-    profiles: Mapping[str, Profile], name: str, sense: str, removed: Collection[str] = ()
+    profiles: Mapping[str, Profile], name: str, sense: str, removed: Collection[str] = (), advice: str = ""
 ) -> Profile:
     """Return the profile of that name.
 
@@ -19,6 +19,7 @@ def find_profile(
         name: of a profile.
         sense: is named in messages.
         removed: profiles of earlier versions, whose networks ``standard`` replaces.
+        advice: where else to look, as the end of a sentence.
 
     Raises:
         WrongUse: there is none.
@@ -27,4 +28,4 @@ def find_profile(
         return profiles[name]
     if name in removed:
         raise WrongUse(f"{sense} no longer has the profile {name!r}; take standard, which needs no torch")
-    raise WrongUse(f"no profile {name!r} of {sense}; {nearest(name, profiles)}")
+    raise WrongUse(f"no profile {name!r} of {sense}; {nearest(name, profiles)}{advice}")

@@ -17,12 +17,12 @@ from experiments.scale_estimation.unseen.training.outlines import train_outlines
 from experiments.scale_estimation.unseen.training.real_shapes import train_real_shapes
 from harness.authoring.network_program import (
     chosen_networks,
-    chosen_profile,
     exit_code,
     require_torch,
     training_parser,
     write_network,
 )
+from harness.authoring.profiles import find_profile
 
 NETWORKS = ("sound", "touch", "imprints")
 REAL_SHAPES = "real-shapes"
@@ -58,7 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _train(options: argparse.Namespace) -> None:
     paper = "; the paper's networks: python -m experiments.paper.train scale --to FOLDER"
-    profile = chosen_profile(options.profile, PROFILES, paper)
+    profile = find_profile(PROFILES, options.profile, "scale", advice=paper)
     senses = chosen_networks(options.only, SENSES)
     fitted = [sense for sense in senses if sense in NETWORKS]
     if fitted:

@@ -17,13 +17,13 @@ from experiments.shape_reconstruction.glance.samples import CompletionProfile
 from harness.authoring.network_program import (
     DEVICES,
     chosen_networks,
-    chosen_profile,
     device_of,
     exit_code,
     require_torch,
     training_parser,
     write_network,
 )
+from harness.authoring.profiles import find_profile
 
 PROFILES = MappingProxyType(
     {
@@ -43,7 +43,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _train(options: argparse.Namespace) -> None:
     paper = "; the paper's networks: python -m experiments.paper.train shape --to FOLDER"
-    amounts = chosen_profile(options.profile, PROFILES, paper)
+    amounts = find_profile(PROFILES, options.profile, "the glance", advice=paper)
     chosen_networks(options.only, ("glance",))
     require_torch()
     device = device_of(options.device)
