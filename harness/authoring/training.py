@@ -2,52 +2,12 @@
 
 import time
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 Report = Callable[[str, float], None]
 """Told what is being done and the share of it that is done."""
-
-
-class Resumable(Protocol):
-    """A training that can stop after any epoch and go on from its checkpoint."""
-
-    epoch: int
-
-    @property
-    def done(self) -> bool:
-        """Whether all epochs were trained."""
-
-    def step_epoch(self) -> float:
-        """Train one epoch; its loss."""
-
-    def save(self, path: Path) -> None:
-        """Write a checkpoint."""
-
-    def load(self, path: Path) -> None:
-        """Go on from a checkpoint."""
-
-
-def train(training: Resumable, epochs: int, checkpoint: Path, report: Report) -> None:
-    """Train to the end, from the checkpoint where there is one.
-
-    Args:
-        training: is trained.
-        epochs: that it takes, to say how far it is.
-        checkpoint: written after every epoch.
-        report: told of progress.
-
-    Raises:
-        DataRefused: a checkpoint that cannot be gone on from.
-    """
-    if checkpoint.exists():
-        training.load(checkpoint)
-    while not training.done:
-        report(f"training, epoch {training.epoch + 1} of {epochs}", training.epoch / epochs)
-        training.step_epoch()
-        training.save(checkpoint)
 
 
 class Laps:

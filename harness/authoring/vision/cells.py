@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from harness.authoring.checkpoint import TrainingProgress, read_checkpoint, write_checkpoint
 from harness.authoring.vision.batch import batch_of
 from harness.authoring.vision.cell_lessons import CellLessons
 from harness.authoring.vision.kernels import teach
@@ -23,6 +22,9 @@ from harness.authoring.vision.lessons import Lessons
 from harness.authoring.vision.profiles import CellsSpec
 from harness.basics.arrays import AnyArray
 from harness.basics.cores import own_cores
+from harness.basics.errors import DataRefused
+from harness.basics.files.foreign_file import refused_as
+from harness.basics.npz_file import read_arrays, write_arrays
 from harness.basics.store import digest
 from harness.objectfile.vision.network import VisionGrid, VisionModel
 
@@ -101,8 +103,9 @@ class CellTraining:
 
     def save(self, path: Path) -> None:
         """Write a checkpoint, whole or not at all."""
-        flats = {"flats": self.flats[: len(self.losses)]}
-        write_checkpoint(path, self.identity, TrainingProgress(self.epoch, self.losses), flats)
+        state = {"identity": np.array(self.identity), "epoch": np.array(self.epoch)}
+        done = {"losses": np.array(self.losses), "flats": self.flats[: len(self.losses)]}
+        write_arrays(path, {**state, **done})
 
     def load(self, path: Path) -> None:
         """Go on from a checkpoint.
@@ -110,9 +113,18 @@ class CellTraining:
         Raises:
             DataRefused: it cannot be read, or is of another network, object, data or seed.
         """
-        progress, arrays = read_checkpoint(path, self.identity)
-        self.epoch, self.losses = progress.epoch, progress.losses
-        self.flats[: len(self.losses)] = arrays["flats"]
+        begin_anew = "; delete it to begin anew"
+        arrays = read_arrays(path, "a checkpoint", advice=begin_anew, refused=DataRefused)
+        with refused_as(DataRefused, f"{path} does not read as a checkpoint: other arrays{begin_anew}"):
+            identity, flats = str(arrays["identity"]), arrays["flats"]
+            epoch, losses = int(arrays["epoch"]), arrays["losses"].tolist()
+        if identity != self.identity:
+            raise DataRefused(
+                f"checkpoint {path} is of another network, object, data or seed; "
+                "delete it to begin anew, or build into another folder"
+            )
+        self.epoch, self.losses = epoch, losses
+        self.flats[: len(losses)] = flats
 
     def _teach(self, cell: int) -> float:
         spec, flat = self.spec, self.flats[cell]

@@ -10,13 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.authoring.vision.places import cosine_about, is_closed, sphere, surface_places, uniform_about
-from harness.basics.arrays import BoolArray, FloatArray, read_only
-from harness.basics.errors import OutOfDomain, WrongUse
+from harness.authoring.vision.places import sphere, uniform_about
+from harness.basics.arrays import BoolArray, FloatArray
+from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
 from harness.picture.pinhole import DirectionalLight, Pinhole
-from harness.sim.light.direct_image import LitObject
-from harness.sim.light.lambert import cosines, places_seen, radiance
 
 APART = float(np.radians(3.0))
 """rad between anything learned from and anything judged by."""
@@ -24,10 +22,8 @@ APART = float(np.radians(3.0))
 FACING = 0.85
 """Share of the lights that are drawn on the side that is seen; the others are from anywhere."""
 
-_CHUNK = 1 << 16
-
 LEAST_YIELD = 1e-3
-"""Of a chunk: below it nothing of the surface can be seen and nothing will come."""
+"""Of the places drawn at once: below it nothing of the surface can be seen and nothing will come."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,21 +58,6 @@ class HeldOutViews:
             return np.ones(len(lights), np.bool_)
         kept = np.stack([light.direction for light in self.lights])
         return np.asarray((lights @ kept.T).max(axis=1) < np.cos(self.apart))
-
-
-@dataclass(frozen=True, eq=False)
-class Tuples:
-    """What leaves places of a surface towards an eye; n of each."""
-
-    points: FloatArray  #: ``(n, 3)`` m, in the object's frame.
-    views: FloatArray  #: ``(n, 3)`` unit, from the camera into the picture.
-    lights: FloatArray  #: ``(n, 3)`` unit, towards the lamp.
-    visible: BoolArray  #: ``(n,)`` whether the place faces the lamp and nothing is in between.
-    normals: FloatArray  #: ``(n, 3)`` unit, smooth, on the side that is seen.
-    colours: FloatArray  #: ``(n, 3)`` linear, under irradiance pi.
-
-    def __len__(self) -> int:
-        return len(self.points)
 
 
 def held_out_pictures(
@@ -125,93 +106,6 @@ def around(mesh: Mesh, way: FloatArray, width: int, height: int, distance: float
     return Pinhole.looking_at(
         middle + distance * mesh.diagonal * way, middle, up, width, height, 2.0 * float(np.arctan(half))
     )
-
-
-def draw_views(
-    mesh: Mesh, count: int, width: int, height: int, seed: int, held_out: HeldOutViews, distance: float = 2.0
-) -> tuple[tuple[Pinhole, DirectionalLight], ...]:
-    """Cameras and lights of pictures to learn from, clear of those kept back.
-
-    A camera is clear where its whole way to the object's middle is. Arguments and errors as in
-    ``held_out_pictures``.
-    """
-    random = np.random.default_rng([seed, 72])
-    middle = mesh.bounds.mean(axis=0)[None]
-    found: list[tuple[Pinhole, DirectionalLight]] = []
-    for _ in range(1000 * count):
-        if len(found) == count:
-            return tuple(found)
-        way = sphere(1, random)
-        if not held_out.clear_of_views(middle, -way)[0]:
-            continue
-        camera = around(mesh, way[0], width, height, distance)
-        light = _facing((camera,), mesh, random)
-        if held_out.clear_of_lights(light)[0]:
-            found.append((camera, DirectionalLight(light[0])))
-    if len(found) == count:
-        return tuple(found)
-    raise OutOfDomain(
-        f"{len(found)} of {count} views are clear of {len(held_out.cameras)} kept back by "
-        f"{np.degrees(held_out.apart):g} deg; keep back fewer, or a smaller angle"
-    )
-
-
-def draw_tuples(lit: LitObject, count: int, seed: int, held_out: HeldOutViews) -> Tuples:
-    """So many tuples; the same seed gives the same, and the first of more are those of fewer.
-
-    Views are drawn with the cosine to the face, as pixels are that look at it from everywhere; those that
-    something of the object is in the way of are not kept.
-
-    Args:
-        lit: the object.
-        count: zero or more.
-        seed: of all that is drawn.
-        held_out: is kept clear of.
-
-    Raises:
-        OutOfDomain: next to nothing of the surface can be seen from outside, clear of what is kept back.
-    """
-    random = np.random.default_rng([seed, 73])
-    both = not is_closed(lit.appearance.mesh)
-    parts: list[Tuples] = []
-    while sum(map(len, parts)) < count or not parts:
-        part = _chunk(lit, random, held_out, both)
-        if len(part) < LEAST_YIELD * _CHUNK:
-            raise OutOfDomain(
-                f"{len(part)} of {_CHUNK} places drawn can be seen from outside and are clear of what is "
-                "kept back; turn the mesh inside out, or keep back less"
-            )
-        parts.append(part)
-    return Tuples(
-        *(
-            read_only(np.concatenate([part.__dict__[name] for part in parts])[:count])
-            for name in ("points", "views", "lights", "visible", "normals", "colours")
-        )
-    )
-
-
-def _chunk(lit: LitObject, random: np.random.Generator, held_out: HeldOutViews, both: bool) -> Tuples:
-    mesh, size = lit.appearance.mesh, lit.appearance.mesh.diagonal
-    faces, weights = surface_places(mesh, _CHUNK, random)
-    side = np.where(random.random(_CHUNK) < 0.5, -1.0, 1.0) if both else np.ones(_CHUNK)
-    outward = side[:, None] * mesh.face_normals[faces]
-    views = -cosine_about(outward, random)
-    lights = np.where(
-        random.random((_CHUNK, 1)) < FACING, uniform_about(outward, random), sphere(_CHUNK, random)
-    )
-    corners = mesh.corners[faces]
-    points = corners[:, 0] + np.einsum("nk,nkx->nx", weights, corners[:, 1:] - corners[:, :1])
-    clear = held_out.clear_of_views(points, views) & held_out.clear_of_lights(lights)
-    seen = np.flatnonzero(clear)
-    seen = seen[lit.rays.free(points[seen], -views[seen], faces[seen])] if len(seen) else seen
-    places = places_seen(lit.appearance, faces[seen], weights[seen], views[seen])
-    faced = cosines(places, lights[seen], size)
-    visible = faced > 0.0
-    if visible.any():
-        begin, towards = places.lifted[visible], lights[seen][visible]
-        visible[visible] = lit.rays.free(begin, towards, places.faces[visible])
-    colours = radiance(places, np.pi * np.where(visible, faced, 0.0))
-    return Tuples(places.points, views[seen], lights[seen], visible, places.normals, colours)
 
 
 def _facing(cameras: tuple[Pinhole, ...], mesh: Mesh, random: np.random.Generator) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy as np
 from harness.authoring.object_source import PartRequest, created_object, provenance_of, source_of
 from harness.authoring.training import Report
 from harness.authoring.vision.profiles import vision_profile
-from harness.authoring.vision.vision import AuthoredVision, author_vision, checkpoints
+from harness.authoring.vision.vision import CHECKPOINT, AuthoredVision, author_vision
 from harness.basics.mesh import Mesh
 from harness.objectfile.entries import Source
 from harness.objectfile.file import ObjectFile
@@ -72,8 +72,7 @@ def build_vision(
         surface=drawn_surface(taken.mesh, look.mesh),
     )
     made = with_vision(created, part)
-    for checkpoint in checkpoints(out):
-        checkpoint.unlink(missing_ok=True)
+    (out / CHECKPOINT).unlink(missing_ok=True)
     seconds = {"mesh": read, **vision.seconds, "write": time.perf_counter() - begun}
     return BuiltVision(made, vision, (*taken.said, *look.remarks), seconds)
 

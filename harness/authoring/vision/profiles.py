@@ -43,8 +43,6 @@ class VisionProfile:
 
     networks: CellsSpec  #: that are made.
     pictures: int  #: kept back, by which they are judged.
-    strict: CellsSpec | None = None
-    """networks told no more than the paper's, made and judged beside and not kept; None for none."""
     side: int = 256  #: pixels of those pictures.
     samples: int = 4  #: a side of a pixel of the reference.
     edge: float = 1.5e-3
@@ -52,10 +50,6 @@ class VisionProfile:
     the object's mesh serves and no finer one is written beside it."""
 
     def __post_init__(self) -> None:
-        if self.strict is not None and self.strict.size.kind != "osf":
-            raise WrongUse(
-                f"networks of kind {self.strict.size.kind!r} are told more than the paper's, which is 'osf'"
-            )
         if min(self.pictures, self.side, self.samples) < 1:
             raise WrongUse(
                 f"{self.pictures} pictures of {self.side} pixels with {self.samples} samples judge nothing; "
@@ -75,16 +69,14 @@ VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
     "standard": VisionProfile(
         CellsSpec(_COMPACT, places=4_000_000, steps=20_000, batch=128),
         pictures=12,
-        strict=CellsSpec(replace(_COMPACT, kind="osf"), places=8_000_000),
     ),
     "paper": VisionProfile(
         CellsSpec(replace(PAPER, kind="osf-v"), places=4_000_000, steps=10_000, batch=128),
         pictures=12,
-        strict=CellsSpec(PAPER, places=8_000_000),
     ),
 })  # fmt: skip
 """None of them needs torch. ``shipped`` takes the fewest bytes, of the files that come with the program.
-``paper`` has networks of ObjectFolder 2.0's size; its strict ones are those, told no more."""
+``paper`` has networks of ObjectFolder 2.0's size."""
 
 
 def vision_profile(name: str) -> VisionProfile:

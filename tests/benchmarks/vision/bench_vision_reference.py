@@ -1,4 +1,4 @@
-"""What reference pictures err and cost: samples a pixel, shadows, two programs, and tuples to learn from.
+"""What reference pictures err and cost: samples a pixel, shadows, two programs.
 
 python tests/benchmarks/vision/bench_vision_reference.py builtin:mug builtin:bowl --size 256
 python tests/benchmarks/vision/bench_vision_reference.py builtin:mug \
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from harness.authoring.vision.data import HeldOutViews, around, draw_tuples, held_out_pictures
+from harness.authoring.vision.data import around
 from harness.basics.arrays import ByteArray
 from harness.picture.image_file import write_png
 from harness.picture.image_metrics import psnr, ssim
@@ -42,7 +42,6 @@ def main() -> None:
     parser.add_argument("--best", type=int, default=16)
     parser.add_argument("--paths", type=int, nargs="*", default=[])
     parser.add_argument("--bounces", type=int, default=2)
-    parser.add_argument("--tuples", type=int, default=200_000)
     parser.add_argument("--sheet", type=Path)
     given = parser.parse_args()
     rows = [measure(name, given) for name in given.objects]
@@ -66,8 +65,6 @@ def measure(name: str, given: argparse.Namespace) -> ByteArray:
     shown = by_samples(lit, camera, given.samples, given.best)
     if given.paths:
         shown += by_paths(look, lit, camera, given.paths, given.bounces, given.best)
-    if given.tuples:
-        by_tuples(lit, given.tuples)
     return np.hstack(shown)
 
 
@@ -127,20 +124,6 @@ def by_paths(
         f"{sum(bounced.seconds.values()):.2f}, with {bounces} bounces: what the direct level leaves out"
     )
     return [found.image.display(0.5), bounced.image.display(0.5)]
-
-
-def by_tuples(lit: LitObject, count: int) -> None:
-    """How fast tuples are drawn, clear of twelve pictures and of none."""
-    held_out = held_out_pictures(lit.appearance.mesh, 12, 256, 256, 0)
-    draw_tuples(lit, 1, 0, held_out)
-    for kept in (HeldOutViews((), ()), held_out):
-        begun, on_core = time.perf_counter(), time.process_time()
-        drawn = draw_tuples(lit, count, 1, kept)
-        wall, core = time.perf_counter() - begun, time.process_time() - on_core
-        CONSOLE.print(
-            f"{len(drawn)} tuples clear of {len(kept.cameras)} pictures: {len(drawn) / core / 1e3:.0f} "
-            f"thousand a second of one core ({wall:.2f} s on the clock), {drawn.visible.mean():.0%} lit"
-        )
 
 
 if __name__ == "__main__":

@@ -6,9 +6,10 @@ import pytest
 from harness.authoring.vision.data import held_out_pictures
 from harness.authoring.vision.lessons import AHEAD, Lessons, draw_lamps, draw_lessons
 from harness.basics.errors import OutOfDomain
+from harness.basics.mesh import Mesh
 from harness.sim.light.appearance import plain
 from harness.sim.light.direct_image import LitObject
-from tests.oracles.seen_shapes import ball
+from tests.oracles.seen_shapes import ball, square, together
 from tests.samples.taught_ball import NOTHING, RADIUS, lit_ball
 
 
@@ -54,6 +55,25 @@ def test_lamps_of_a_place_light_it(lit: LitObject) -> None:
     assert not lessons.colours[cosine < -1e-6].any()
     assert held_out.clear_of_lights(lessons.lamps.astype(np.float64)).all()
     assert np.all(np.unique(lessons.points, axis=0, return_counts=True)[1] <= 4)
+
+
+def test_what_no_camera_sees_is_not_learned() -> None:
+    both = together(ball(0.03, 2), ball(0.05, 2))
+    lessons = draw_lessons(LitObject(plain(both, (0.8, 0.5, 0.2))), 3000, 1e-3, 9, NOTHING)
+    assert np.linalg.norm(lessons.points, axis=1).min() > 0.04
+
+
+def test_an_open_sheet_is_learned_from_both_sides() -> None:
+    lessons = draw_lessons(LitObject(plain(square(0.1), (0.8, 0.5, 0.2))), 2000, 1e-3, 10, NOTHING)
+    assert 0.4 < (lessons.normals[:, 2] > 0.0).mean() < 0.6
+    assert (np.einsum("nx,nx->n", lessons.normals, lessons.views) < 0.0).all()
+
+
+def test_an_object_inside_out_is_refused() -> None:
+    mesh = ball(0.05, 2)
+    turned = LitObject(plain(Mesh(mesh.vertices, mesh.faces[:, ::-1]), (0.8, 0.5, 0.2)))
+    with pytest.raises(OutOfDomain, match=r"\b0 of \d+ places"):
+        draw_lessons(turned, 10, 1e-3, 0, NOTHING)
 
 
 def test_fewer_lessons_are_the_first_of_more(lit: LitObject) -> None:

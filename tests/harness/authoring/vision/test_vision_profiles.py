@@ -26,10 +26,7 @@ def test_profiles_are_as_large_as_they_are_named() -> None:
     compact, paper = vision_profile("standard"), vision_profile("paper")
     assert replace(paper.networks.size, kind="osf") == PAPER
     assert replace(compact.networks.size, kind="osf") == COMPACT
-    assert paper.strict is not None
-    # The paper's very network, of 20 292 parameters.
-    assert paper.strict.size == PAPER
-    assert paper.strict.size.parameters == 20_292
+    assert PAPER.parameters == 20_292
 
 
 @pytest.mark.slow  # of the longest training alone
@@ -49,8 +46,6 @@ def test_networks_of_the_papers_size_learn_too(lit: LitObject, tmp_path: Path) -
 
 
 def test_what_cannot_be_trained_says_so(lit: LitObject, tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="'osf'"):
-        VisionProfile(TINY, pictures=1, strict=TINY)
     for wrong in ({"places": 0}, {"overlap": 0.7}, {"hidden": 1.5}, {"rate": 0.0}):
         with pytest.raises(WrongUse, match="give"):
             replace(TINY, **wrong)
