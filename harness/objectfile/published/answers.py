@@ -146,7 +146,7 @@ def read_queries(of: Object, files: Mapping[str, Path | None], settings: QuerySe
             raise DataRefused(f"{counts} rows of {' and '.join(options)}; give one of each for each query")
         queries[sense] = tuple(rows)
         given -= set(options)
-    for name in given:
+    for name in sorted(given):
         raise WrongUse(f"{name} is not for {kind}: {_REASONS[name]}; leave it out")
     return queries
 

@@ -10,9 +10,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from harness.basics.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray
 from harness.basics.errors import CalibrationRefused
 from harness.objectfile.published.touch import SEEN_DEPTH
+from harness.sim.optics.kernels import change_exactly
 from harness.sim.optics.published_pack import PRESSES, TABLE, read_published, read_table
 
 PITCH = 0.1245e-3
@@ -82,21 +83,9 @@ def table_colours(height: FloatArray, table: FloatArray) -> FloatArray:
         height: ``(rows, columns)`` pixels.
         table: ``(bins, bins, 6, 3)``: by steepness and direction, a polynomial of the place.
     """
-    rows, columns = height.shape
-    y, x = np.mgrid[:rows, :columns].astype(np.float64)
-    terms = np.stack([x * x, y * y, x * y, x, y, np.ones_like(x)], axis=-1)
-    steep, turned = _bins(height, len(table))
-    found: FloatArray = np.einsum("rct,rctk->rck", terms, table[steep, turned])
-    return found
-
-
-def _bins(height: FloatArray, bins: int) -> tuple[IntArray, IntArray]:
-    down = (height[2:, 1:-1] - height[:-2, 1:-1]) / 2.0
-    right = (height[1:-1, 2:] - height[1:-1, :-2]) / 2.0
-    slope = np.hypot(down, right)
-    steep = np.arctan(slope) / (0.5 * np.pi / (bins - 1))
-    turned = (np.where(slope > 0.0, np.arctan2(down, right), 0.0) + np.pi) / (2.0 * np.pi / (bins - 1))
-    return np.pad(steep.astype(np.int64), 1, "edge"), np.pad(turned.astype(np.int64), 1, "edge")
+    colours = np.empty((*height.shape, 3))
+    change_exactly(height, table, colours)
+    return colours
 
 
 def _skirted(height: FloatArray, contact: BoolArray) -> FloatArray:
