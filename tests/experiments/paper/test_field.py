@@ -1,18 +1,23 @@
-"""1.0's look: rays that meet nothing are white, a solid ball is where it is, training finds the object."""
+"""Looks of 1.0 and 2.0: rays that meet nothing are white, objects are where they are, training finds them."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
 from experiments.paper.hexahedra import is_within
-from experiments.paper.look import DISTANCE, UniformField, ball_of
+from experiments.paper.look import DISTANCE, CellFields, UniformField, ball_of
 from harness.authoring.vision.data import around
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.mesh import Mesh
 from harness.objectfile.published.look import FOCAL, SIZE
 from harness.objectfile.published.volume_render import stretched_sigmoid
+from harness.objectfile.vision.graph import VisionNetworks
+from harness.objectfile.vision.render import open_vision
 from harness.picture.pinhole import DirectionalLight
+from tests.samples.look_bench import BOX, box_file
 
 DENSE = 1e4
 
@@ -60,6 +65,18 @@ def test_what_a_field_holds_outside_of_the_ball_is_not_drawn() -> None:
         camera, DirectionalLight(np.array([0.0, 0.0, 1.0]))
     )
     assert (picture == 255).all()
+
+
+def test_networks_of_cells_are_drawn_where_the_object_is_in_their_colour(tmp_path: Path) -> None:
+    of, light = box_file(tmp_path / "box"), DirectionalLight(np.array([0.0, 0.0, 1.0]))
+    assert of.description.vision is not None
+    camera = around(BOX, np.array([0.6, 0.3, 0.8]), 32, 32, DISTANCE)
+    fields = CellFields(VisionNetworks(of.read(of.description.vision.network)), BOX, 8)
+    picture, wanted = fields.picture(camera, light), open_vision(of, 1).picture(camera, light).image.display()
+    covered, wanted_covered = ((each != 255).any(axis=2) for each in (picture, wanted))
+    assert covered[wanted_covered].mean() > 0.95  # the others are pixels of an edge
+    assert covered.sum() < 1.2 * wanted_covered.sum()  # by the voxels before the surface
+    assert np.abs(picture[16, 16].astype(int) - wanted[16, 16]).max() <= 1
 
 
 def test_colours_are_stretched_as_published() -> None:
