@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -31,6 +31,8 @@ from harness.objects.builtin import DESCRIPTION
 LICENCE = "CC BY 4.0, as ObjectFolder publishes its ObjectFiles; the scanned mesh keeps its own licence"
 
 _AUDIO, _TOUCH, _VOXELS = "audio.onnx", "touch.onnx", "audio_voxels.npy"
+
+_UNKNOWN_UNIT = "not stated by the file"
 
 _EVERY = [
     "the object's mesh and material, so that no run and no other command than `object render queries` uses it"
@@ -133,10 +135,8 @@ def take_gains(audio: FileTable, _: Bounds | None, parts: ImportedParts) -> None
     frequencies, dampings = (audio.array(key, (None,)) for key in ("frequencies", "dampings"))
     (low, high), modes = normaliser.box(), len(frequencies)
     points = _input("points", "m", "where the object is struck", low, high)
-    gains = Tensor(
-        name="gains", dtype="float32", shape=("n", modes, 3), unit="not stated by the file", frame="mesh",
-        meaning="gain of each mode for a unit force along x, y, z",
-    )  # fmt: skip
+    meaning = "gain of each mode for a unit force along x, y, z"
+    gains = _output("gains", ("n", modes, 3), _UNKNOWN_UNIT, meaning, "mesh")
     ranges = _force_ranges(normaliser, modes)
     parts.tree["audio_gains"] = {
         "frequencies_hz": frequencies.tolist(),
@@ -150,12 +150,9 @@ def take_gains(audio: FileTable, _: Bounds | None, parts: ImportedParts) -> None
 
 def take_spectra(audio: FileTable, bounds: Bounds | None, parts: ImportedParts) -> None:
     """Read the sound of version 1.0; ``DataRefused`` as ``take_gains``."""
-    meaning = "x y z of a voxel, frequency, time: 0 to 1"
-    place = _input("place", "1", meaning, np.zeros(5), np.ones(5))
-    spectrum = Tensor(
-        name="spectrum", dtype="float32", shape=("n", 2, 3), unit="not stated by the file", frame="mesh",
-        meaning="real and imaginary part, for a unit force along x, y, z",
-    )  # fmt: skip
+    place = _input("place", "1", "x y z of a voxel, frequency, time: 0 to 1", np.zeros(5), np.ones(5))
+    meaning = "real and imaginary part, for a unit force along x, y, z"
+    spectrum = _output("spectrum", ("n", 2, 3), _UNKNOWN_UNIT, meaning, "mesh")
     ranges = _force_ranges(audio.part("normalizer"), 1)
     parts.contents[_VOXELS] = npy_bytes(audio.array("voxel_vertex", (None, 3)), "<f8")
     parts.tree["audio_spectrum"] = {
@@ -178,13 +175,7 @@ def take_depths(touch: FileTable, _: Bounds | None, parts: ImportedParts) -> Non
     most = np.array([*high, TILT, 1.0, 1.0, PRESS_DEPTH[1], rows - 1.0, columns - 1.0])
     meaning = "x y z, m; tilt, rad; cosine and sine of its azimuth; depth of the press, m; row; column"
     pixel = _input("pixel", "m, rad, 1 and pixels", meaning, least, most)
-    depth = Tensor(
-        name="depth",
-        dtype="float32",
-        shape=("n", 1),
-        unit="m",
-        meaning="from the gel's camera to its surface",
-    )
+    depth = _output("depth", ("n", 1), "m", "from the gel's camera to its surface")
     shift, factor = least.copy(), 1.0 / (most - least)
     shift[4:6], factor[4:6] = 0.0, 1.0  # cosine and sine stay as they are
     ranges = [("", np.array([near]), np.array([far]))]
@@ -208,9 +199,7 @@ def take_colours(touch: FileTable, bounds: Bounds | None, parts: ImportedParts) 
     if bounds is not None:
         greatest[:3] = max(1.0, float(normalised_coordinates(np.array([bounds[1]]), bounds)[0]))
     place = _input("place", "1", "x y z; row and column, -1 to 1", np.full(5, -1.0), greatest)
-    colours = Tensor(
-        name="colours", dtype="float32", shape=("n", 3), unit="1", meaning="red green blue, -1 to 1"
-    )
+    colours = _output("colours", ("n", 3), "1", "red green blue, -1 to 1")
     ranges = [("", np.zeros(1), np.ones(1))]
     parts.tree["touch_colours"] = {
         "bounds_m": bounds,
@@ -243,6 +232,12 @@ def _input(name: str, unit: str, meaning: str, low: FloatArray, high: FloatArray
     """Describe ``(n, k)`` inputs from ``low`` to ``high`` in the mesh's frame."""
     domain = Domain(low=tuple(low.tolist()), high=tuple(high.tolist()))
     return graph_input(name, "float64", ("n", len(low)), unit, meaning, domain, "mesh")
+
+
+def _output(
+    name: str, shape: tuple[int | Literal["n"], ...], unit: str, meaning: str, frame: str = ""
+) -> Tensor:
+    return Tensor(name=name, dtype="float32", shape=shape, unit=unit, meaning=meaning, frame=frame)
 
 
 def _perceptrons(

@@ -21,7 +21,7 @@ from harness.basics.geometry import transform
 from harness.basics.npz_file import read_array, write_array
 from harness.objectfile.audio.audio import open_audio
 from harness.objectfile.audio.blow import HammerBlow
-from harness.objectfile.audio.sound_wav import HEADROOM, wav_rate, write_wav
+from harness.objectfile.audio.sound_wav import HEADROOM, write_wav
 from harness.objectfile.audio.strike import place_near, strike
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.published.entries import PublishedObject
@@ -247,7 +247,6 @@ def _write_sounds(
         sounds = peak_normalised(sounds) if settings.compat else sounds
     paths = [folder / f"{number}.wav" for number in range(1, len(sounds) + 1)]
     if not settings.compat:
-        wav_rate(rate)
         answered.full_scale = HEADROOM * float(np.abs(sounds).max())
     for path, sound in zip(paths, sounds, strict=True):
         if answered.full_scale is None:
@@ -267,18 +266,13 @@ def _strike_built(
         amplitudes = np.einsum("nmd,nd->nm", audio.at(vertices), forces)
         damped = np.sqrt(np.maximum(audio.frequencies**2 - (audio.dampings / (2.0 * np.pi)) ** 2, 0.0))
         return compat_sounds(amplitudes, damped, audio.dampings)
-    struck = [
-        strike(
-            audio,
-            place_near(audio.surface, vertex, audio.most),
-            HammerBlow.instant(force),
-            settings.seconds,
-            settings.rate,
-        )
-        for vertex, force in zip(vertices, forces, strict=True)
-    ]
-    _note_left_out(int(struck[-1].left_out.sum()), settings.rate, notes)
-    return np.stack([each.sound for each in struck])
+    sounds = []
+    for vertex, force in zip(vertices, forces, strict=True):
+        place = place_near(audio.surface, vertex, audio.most)
+        struck = strike(audio, place, HammerBlow.instant(force), settings.seconds, settings.rate)
+        sounds.append(struck.sound)
+    _note_left_out(int(struck.left_out.sum()), settings.rate, notes)
+    return np.stack(sounds)
 
 
 def _note_left_out(modes: int, rate: float, notes: list[str]) -> None:

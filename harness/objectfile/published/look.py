@@ -21,6 +21,7 @@ from harness.objectfile.published.entries import PublishedCellsEntry, PublishedO
 from harness.objectfile.published.query import query
 from harness.objectfile.published.volume_render import render_rays, stretched_sigmoid
 from harness.objectfile.runtime import Network
+from harness.objectfile.vision.graph import sort_into_blocks
 from harness.objectfile.vision_tensors import graph_input
 from harness.picture.pinhole import unit_vector
 
@@ -181,22 +182,15 @@ class CellNetworks:
 
     def raw(self, points: FloatArray, views: FloatArray, light: FloatArray) -> FloatArray:
         """Compute raw colour and density; see ``RawField``."""
-        result = np.zeros((len(points), 4))
-        which = self.network_at(points)
-        inside = np.flatnonzero(which >= 0)
-        order = inside[np.argsort(which[inside], kind="stable")]
-        rows, samples = blocks(which[order], self.entry.block)
-        if not len(rows):
-            return result
-        # The places behind a block's samples repeat another, whose answer is left out.
-        chosen, used = order[samples], samples >= 0
+        result, networks = np.zeros((len(points), 4)), int(self.networks.max()) + 1
+        chosen, rows = sort_into_blocks(self.network_at(points), networks, self.entry.block)
         inputs = {
             "network": rows[:, None],
             "points": points[chosen],
             "views": views[chosen],
             "light": np.broadcast_to(light, (len(rows), 3)),
         }
-        result[chosen[used]] = _joined(query(self.network, inputs, _BLOCKS))[used]
+        result[chosen] = _joined(query(self.network, inputs, _BLOCKS))
         return result
 
     def network_at(self, points: FloatArray) -> IntArray:
@@ -210,25 +204,6 @@ class CellNetworks:
             numbers = np.where(self.occupied[_flat_index(fraction, self.entry.voxels)], numbers, -1)
         which[inside] = numbers
         return which
-
-
-def blocks(networks: IntArray, size: int) -> tuple[IntArray, IntArray]:
-    """Divide sorted samples into blocks of one network each.
-
-    Args:
-        networks: ``(n,)`` ascending, of each sample.
-        size: samples of a block.
-
-    Returns:
-        ``(b,)`` the network of each block, and ``(b, size)`` its samples, -1 behind the last one.
-    """
-    names, first, counts = np.unique(networks, return_index=True, return_counts=True)
-    needed = -(-counts // size)
-    rank = np.arange(len(networks)) - np.repeat(first, counts)
-    start = np.cumsum(needed) - needed
-    samples = np.full((int(needed.sum()), size), -1)
-    samples[np.repeat(start, counts) + rank // size, rank % size] = np.arange(len(networks))
-    return np.repeat(names, needed).astype(np.int64), samples
 
 
 def _flat_index(fraction: FloatArray, sizes: tuple[int, int, int]) -> IntArray:

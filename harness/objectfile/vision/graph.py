@@ -107,7 +107,7 @@ class VisionNetworks:
         networks = self.grid.networks(points)
         shape = (len(points), 3)
         found = Answers(networks >= 0, np.empty(shape[0], np.float32), np.empty(shape, np.float32))
-        asked, of_block = _in_blocks(networks, len(self.grid), self.block)
+        asked, of_block = sort_into_blocks(networks, len(self.grid), self.block)
         for first in range(0, len(asked), _AT_ONCE):
             at = asked[first : first + _AT_ONCE]
             inputs = {
@@ -122,7 +122,7 @@ class VisionNetworks:
 
 
 @compiled
-def _in_blocks(networks: IntArray, every: int, size: int) -> tuple[IntArray, IntArray]:
+def sort_into_blocks(networks: IntArray, every: int, size: int) -> tuple[IntArray, IntArray]:
     """Sort points by network into blocks.
 
     A block that is not full asks for its last point again, so that all there is is asked. A network that

@@ -8,8 +8,9 @@ import pytest
 from harness.basics.arrays import FloatArray
 from harness.objectfile.published.answers import grey_levels
 from harness.objectfile.published.entries import PublishedVisionEntry
-from harness.objectfile.published.look import PublishedLook, blocks, views_of
+from harness.objectfile.published.look import PublishedLook, views_of
 from harness.objectfile.published.volume_render import further_depths, ray_weights
+from harness.objectfile.vision.graph import sort_into_blocks
 
 VIEW = views_of(np.array([[0.0, -2.5, 0.0, 0.0, 0.0, 1.0]]), 1.0, compat=False)[0]
 
@@ -108,11 +109,8 @@ def test_further_samples_lie_where_the_weights_are() -> None:
 
 @pytest.mark.parametrize("size", [1, 3, 64])
 def test_every_sample_is_in_one_block_of_its_own_network(size: int) -> None:
-    networks = np.sort(np.random.default_rng(0).integers(0, 6, 100)) * 7
-    rows, samples = blocks(networks, size)
-    used = samples[samples >= 0]
-    assert np.array_equal(np.sort(used), np.arange(100))
-    assert samples[:, 0].min() >= 0
-    for row, block in zip(rows, samples, strict=True):
-        assert (networks[block[block >= 0]] == row).all()
-    assert [len(part) for part in blocks(np.empty(0, np.int64), size)] == [0, 0]
+    networks = np.random.default_rng(0).integers(-1, 6, 100)
+    samples, rows = sort_into_blocks(networks, 6, size)
+    assert np.array_equal(np.unique(samples), np.flatnonzero(networks >= 0))
+    assert (networks[samples] == rows[:, None]).all()
+    assert [len(part) for part in sort_into_blocks(np.empty(0, np.int64), 6, size)] == [0, 0]
