@@ -35,9 +35,9 @@ def test_a_hull_is_a_closed_body_and_needs_contacts_out_of_one_plane(count: int)
     require_whole(by_hull(evidence_of(TOUCHES[:count])))
     up = np.array([0.0, 0.0, 1.0])
     points = np.random.default_rng(0).normal(size=(9, 3)) * [5e-3, 5e-3, 0.0]
-    with pytest.raises(FitRefused, match="one plane"):
+    with pytest.raises(FitRefused, match=r"9 contact.*plane"):
         by_hull(evidence_of((touch_of(points, up, np.tile(up, (9, 1)), 0),)))
-    with pytest.raises(FitRefused, match="none of 0 touches met"):
+    with pytest.raises(FitRefused, match="0 touches"):
         by_hull(evidence_of((), LOOK))
 
 
@@ -48,7 +48,7 @@ def test_a_hull_too_thin_for_its_grid_is_refused_by_what_was_touched() -> None:
         normal = np.array([side, 0.0, 0.0])
         points = np.column_stack([np.full(y.size, 0.2e-3 * side), y, z])
         sides.append(touch_of(points, normal, np.repeat(normal[None], y.size, axis=0), k))
-    with pytest.raises(FitRefused, match="2 contacts span a body less than 4 mm thick"):
+    with pytest.raises(FitRefused, match=r"2 contacts .*4 mm"):
         by_hull(evidence_of(tuple(sides)))
 
 
@@ -65,7 +65,7 @@ def test_the_visual_hull_holds_what_is_seen_and_does_not_know_how_deep_it_is() -
     assert float(within.mean()) > 0.75
     assert "x" in answer.not_bounded  # the camera looks along it
     assert "y" not in answer.not_bounded
-    with pytest.raises(FitRefused, match="in no picture"):
+    with pytest.raises(FitRefused, match="picture"):
         by_visual_hull(evidence_of((), replace(LOOK, mask=np.zeros_like(LOOK.mask))))
 
 

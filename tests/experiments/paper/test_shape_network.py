@@ -141,10 +141,10 @@ def test_a_network_that_echoes_gives_the_touched_places_back(folder: Path) -> No
 def test_a_sense_that_is_not_there_is_refused_by_name(folder: Path) -> None:
     networks = networks_in(folder)
     for sense in ("picture", "both"):
-        with pytest.raises(FitRefused, match="saw nothing"):
+        with pytest.raises(FitRefused, match="camera"):
             networks[sense].complete(replace(BOTH, look=None))
     for sense in ("touch", "both"):
-        with pytest.raises(FitRefused, match="met the object"):
+        with pytest.raises(FitRefused, match="0 touches"):
             networks[sense].complete(replace(BOTH, touches=()))
     assert np.isfinite(networks["picture"].complete(replace(BOTH, touches=()))).all()
 
@@ -153,7 +153,7 @@ def test_a_folder_without_a_network_or_a_card_is_refused(folder: Path, tmp_path:
     with pytest.raises(DataRefused, match=r"experiments\.paper\.train shape --to FOLDER"):
         paper_completions(tmp_path / "none")
     (folder / "touch.json").unlink()
-    with pytest.raises(DataRefused, match="no card"):
+    with pytest.raises(DataRefused, match=r"touch\.onnx .*shape --to FOLDER"):
         paper_completions(folder)
 
 
@@ -175,7 +175,7 @@ def test_rows_of_the_networks_that_are_there_stand_in_the_table(
 @pytest.mark.parametrize("key", ["library", "pcn"])
 def test_a_run_refuses_folders_that_only_a_table_uses(key: str, station: Station) -> None:
     tree = {"schema": 1, "object": {"mesh": "builtin:mug"}, "shape": {key: "somewhere"}}
-    with pytest.raises(WrongUse, match=f"tables shape-reconstruction --set {key}=FOLDER"):
+    with pytest.raises(WrongUse, match=f"--set {key}=FOLDER"):
         plan(scene_from_json(tree, "mug"), station, MUG, 0)
 
 

@@ -81,14 +81,14 @@ def test_a_folder_gives_its_closed_meshes_and_names_the_others(tmp_path: Path) -
     shapes, left_out = library_of(tmp_path)
     assert "bowl.ply" in [shape.name for shape in shapes]
     assert any("empty.stl" in reason for reason in left_out)
-    with pytest.raises(MeshRefused, match="not closed"):
+    with pytest.raises(MeshRefused, match=r"open .*closed"):
         LibraryShape.of("open", Mesh(bowl.vertices, bowl.faces[:-40]))
 
 
 def test_no_folder_no_shape_and_no_contact_are_refused_by_name(tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="no folder"):
+    with pytest.raises(WrongUse, match="nowhere"):
         library_of(tmp_path / "nowhere")
-    with pytest.raises(WrongUse, match="holds no closed mesh"):
+    with pytest.raises(WrongUse, match=r"\.ply.*ObjectFiles"):
         library_of(tmp_path)
     with pytest.raises(FitRefused):
         by_retrieval(evidence_of(()), LIBRARY)

@@ -31,9 +31,9 @@ def test_every_point_is_taken_as_often_as_can_be() -> None:
 
 
 def test_touches_of_no_place_are_refused_by_name() -> None:
-    with pytest.raises(OutOfDomain, match="in more places"):
+    with pytest.raises(OutOfDomain, match=r"0\.00 mm.* 1 mm"):
         frame_of(np.zeros((5, 3)))
-    with pytest.raises(OutOfDomain, match="no place"):
+    with pytest.raises(OutOfDomain, match=r"^\D*touch\D*$"):
         frame_of(np.zeros((0, 3)))
 
 

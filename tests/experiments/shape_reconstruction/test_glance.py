@@ -57,7 +57,7 @@ def test_what_is_too_large_for_the_network_is_not_glanced_at() -> None:
     large = build("plate", 6e-3)
     large = Mesh(2.5 * large.vertices, large.faces)
     seen = evidence_of((), look_at(large), largest=0.8)
-    with pytest.raises(FitRefused, match="looks no farther"):
+    with pytest.raises(FitRefused, match="200 mm"):
         by_glanced_surface(seen)
     assert estimated("family", seen).details.get("estimator") != "glance"
 
@@ -95,7 +95,7 @@ def test_a_glance_turns_with_the_bench() -> None:
 def test_without_a_silhouette_there_is_no_glance() -> None:
     look = look_at(build("mug", 6e-3))
     for nothing in (None, replace(look, mask=np.zeros_like(look.mask))):
-        with pytest.raises(FitRefused, match="let it look again"):
+        with pytest.raises(FitRefused, match="camera"):
             silhouette_to_glance_at(evidence_of((), nothing))
     with pytest.raises(FitRefused):
         estimated("glance", evidence_of((), None))
@@ -109,7 +109,7 @@ def test_the_card_says_what_was_held_out() -> None:
     assert shipped().held_out < 0.01
     assert shipped().card["profile"] == "long"
     assert shipped().held_out < 1.3 * fitted["mean_chamfer_points_m"]  # it has not learnt by heart
-    with pytest.raises(DataRefused, match="train it again"):
+    with pytest.raises(DataRefused, match=r"held_out.*mean_chamfer_points_m"):
         replace(shipped(), card={}).held_out  # noqa: B018 - it is computed
 
 

@@ -93,7 +93,7 @@ def test_a_spoiled_picture_is_named_and_the_rest_answers(touched: Recording, tmp
 
 def test_where_no_picture_is_left_the_reason_is_the_refusal(blind: Recording, tmp_path: Path) -> None:
     spoiled = with_spoiled_pictures(blind, tmp_path / "run", "black", 0, 1, 2, 3)
-    with pytest.raises(FitRefused, match=r"no reading is left; step 1: .* lights are off"):
+    with pytest.raises(FitRefused, match=r"step 1: .*0% .*light"):
         answered(spoiled)
 
 
@@ -254,8 +254,8 @@ def test_presses_on_the_drawing_are_a_benchmark_and_say_so(tmp_path: Path, stati
 @pytest.mark.parametrize(
     ("tree", "words"),
     [
-        ({"sensors": {"touch": False}}, "nothing is to be read"),
-        ({"shape": {"presses": 0}}, "nothing is to be read"),
+        ({"sensors": {"touch": False}}, "vision.*presses"),
+        ({"shape": {"presses": 0}}, "vision.*presses"),
         ({"object": {"mesh": "builtin:mug", "pose": {"anchor": "origin"}}}, "anchor"),
     ],
     ids=["no sense", "no press", "origin"],
@@ -288,14 +288,14 @@ def test_readings_of_nothing_are_refused_with_what_to_do_next(blind: Recording) 
     evidence = evidence_of(RunFiles(blind), blind.steps())
     missed = tuple(touch for touch in evidence.touches if not touch.met)
     for method in ("rbf", "family"):
-        with pytest.raises(FitRefused, match=f"{len(missed)} ways of the gel met nothing; check where"):
+        with pytest.raises(FitRefused, match=f"{len(missed)} .*camera"):
             estimated(method, replace(evidence, touches=missed))
 
 
 @pytest.mark.parametrize("level", REMOVED)
 def test_a_removed_method_is_refused_and_a_stored_one_is_replaced(level: str) -> None:
     assert REMOVED[level] in METHODS
-    with pytest.raises(WrongUse, match=f"no longer has the level '{level}'; take {REMOVED[level]}"):
+    with pytest.raises(WrongUse, match=f"'{level}'.* {REMOVED[level]}"):
         METHOD.checked(level)
     assert current_levels([METHOD], {METHOD.name: level}) == {METHOD.name: REMOVED[level]}
     assert EXPERIMENT.budgets is not None

@@ -49,11 +49,9 @@ def test_an_outline_away_from_the_stated_place_is_refused_by_every_method(
 ) -> None:
     moved = away(SEEN, distance * np.array([np.cos(towards), np.sin(towards)]))
     for method in METHODS:
-        with pytest.raises(
-            FitRefused, match=r"stands .* m from the stated place .* largest 0.3 m .* within 0.14 m"
-        ):
+        with pytest.raises(FitRefused, match=r" m .*largest 0.3 m .*0.14 m"):
             estimated(method, moved)
-    with pytest.raises(FitRefused, match="from the stated place"):
+    with pytest.raises(FitRefused, match=r" m .*largest 0.3 m .*0.14 m"):
         continued(moved, CONTINUED, None)
 
 
@@ -66,15 +64,15 @@ def test_an_outline_above_the_horizon_stands_nowhere() -> None:
     assert SEEN.look is not None
     pose = SEEN.look.stand_from_camera.copy()
     pose[2, 3] *= -1.0
-    with pytest.raises(FitRefused, match="stands above the horizon"):
+    with pytest.raises(FitRefused, match="horizon"):
         estimated("glance", replace(SEEN, look=replace(SEEN.look, stand_from_camera=pose)))
 
 
 def test_contacts_away_from_the_stated_place_or_too_far_apart_are_refused() -> None:
-    with pytest.raises(FitRefused, match=r"met something 0.3\d m from the stated place; .* within 0.27 m"):
+    with pytest.raises(FitRefused, match=r"0.3\d m .*0.27 m"):
         estimated("rbf", away(TOUCHED, np.array([0.32, 0.0])))
     pair = (TOUCHED.touches[0], away(TOUCHED, np.array([0.26, 0.0])).touches[0])
-    with pytest.raises(FitRefused, match=r"contacts are 0.1\d m apart, and \[shape\] largest is 0.15 m"):
+    with pytest.raises(FitRefused, match=r"0.1\d m .*largest .*0.15 m"):
         estimated("rbf", replace(TOUCHED, touches=pair, largest=0.15, place_error=0.08))
     assert estimated("rbf", TOUCHED).mesh.vertices.size
 
@@ -92,9 +90,9 @@ def test_an_answer_longer_than_stated_is_refused(
         assert estimated("box", TOUCHED, box) is grown
         assert continued(TOUCHED, CONTINUED, None) is grown
         return
-    with pytest.raises(FitRefused, match=r"a body 0.33 m long \(method box\), .* largest is 0.3 m"):
+    with pytest.raises(FitRefused, match=r"0.33 m .*box.*largest .*0.3 m"):
         estimated("box", TOUCHED, box)
-    with pytest.raises(FitRefused, match=r"0.33 m long \(method family\)"):
+    with pytest.raises(FitRefused, match=r"0.33 m .*family"):
         continued(TOUCHED, CONTINUED, None)
 
 
@@ -120,7 +118,7 @@ def test_hypotheses_away_from_the_stated_place_or_too_large_are_left_out(
     theta[0] = 1.01 * max_offset(TOUCHED)
     far = replace(near, shape=replace(near.shape, theta=theta))
     assert family._at_stated_place([far, near], TOUCHED) == [near]
-    with pytest.raises(FitRefused, match=r"m from the stated place; \[shape\] largest is 0.3 m"):
+    with pytest.raises(FitRefused, match=r" m .* m .*largest .*0.3 m"):
         family._at_stated_place([far], TOUCHED)
-    with pytest.raises(FitRefused, match=r"largest is 0.01 m"):
+    with pytest.raises(FitRefused, match=r"largest .*0.01 m"):
         family._at_stated_place([near], replace(TOUCHED, largest=0.01))

@@ -50,7 +50,7 @@ def test_senses_of_two_versions_are_no_objectfile() -> None:
         "VisionNet": published_trees.first()["VisionNet"],
         "AudioNet": published_trees.second()["AudioNet"],
     }
-    with pytest.raises(DataRefused, match="of one version"):
+    with pytest.raises(DataRefused, match=r"1\.0.*2\.0"):
         format_of(tree, "a file")
 
 
@@ -175,9 +175,9 @@ def test_modes_without_dampings_of_their_own_are_refused(tmp_path: Path) -> None
 
 def test_bounds_are_for_version_1_and_in_order() -> None:
     tree = published_trees.second()
-    with pytest.raises(WrongUse, match="hold their own bounds"):
+    with pytest.raises(WrongUse, match=r"--\w+.*ObjectFolder 1\.0"):
         gathered(tree, "a file", "ObjectFolder 2.0", (0.0, 1.0), None)
-    with pytest.raises(WrongUse, match="least coordinate comes first"):
+    with pytest.raises(WrongUse, match=r"0\.2 -0\.2"):
         gathered(published_trees.first(), "a file", "ObjectFolder 1.0", None, (0.2, -0.2))
 
 

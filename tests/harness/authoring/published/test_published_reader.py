@@ -122,7 +122,7 @@ def test_an_archive_of_something_else_is_refused_by_what_it_lacks(tmp_path: Path
     path = tmp_path / "arrays.pth"
     with path.open("wb") as stream:
         np.savez(stream, a=np.zeros(3))
-    with pytest.raises(DataRefused, match=r"without torch's data\.pkl"):
+    with pytest.raises(DataRefused, match=r"data\.pkl"):
         read_container(path)
 
 
@@ -133,18 +133,18 @@ def test_without_torch_the_extra_that_has_it_is_named(
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("archive/data.pkl", b"")
     monkeypatch.setitem(sys.modules, "torch", None)
-    with pytest.raises(WrongUse, match=r"extra `author`: pip install '\.\[author\]'"):
+    with pytest.raises(WrongUse, match=r"pip install '\.\[author\]'"):
         read_container(path)
 
 
 def test_a_file_that_is_not_there_is_wrong_use(tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="there is no file"):
+    with pytest.raises(WrongUse, match=r"ObjectFile\.pth"):
         read_container(tmp_path / "ObjectFile.pth")
 
 
 @pytest.mark.parametrize("tree", [{(1, 2): 3}, {"a": object()}, {"a": b"bytes"}, {"a": {1, 2}}])
 def test_tables_of_anything_but_numbers_and_text_are_refused(tree: Any) -> None:
-    with pytest.raises(DataRefused, match=r"give the \.pth as it was published"):
+    with pytest.raises(DataRefused, match=r"\.pth"):
         plain_tree(tree, "a file")
 
 
@@ -208,7 +208,7 @@ def test_a_malicious_file_runs_nothing(
     torch.save(calls[call] if where == "alone" else tree, path)
     assert invoke(["object", "import", str(path), "--out", str(tmp_path / "out"), "--json"]) == 1
     said = json.loads(capsys.readouterr().out)["error"]
-    assert "nothing of it was run" in said
+    assert "ObjectFile.pth" in said
     assert "\n" not in said
     assert not mark.exists()
     assert not (tmp_path / "out").exists()
@@ -219,7 +219,7 @@ def test_a_file_that_was_cut_short_gets_one_sentence(share: float, tmp_path: Pat
     with_torch()
     path = write_published(published_trees.second(), tmp_path / "ObjectFile.pth")
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
-    with pytest.raises(DataRefused, match=r"damaged or cut short|no archive of torch"):
+    with pytest.raises(DataRefused, match=r"damaged|archive"):
         read_container(path)
 
 
@@ -240,7 +240,7 @@ def test_tables_that_refer_to_each_other_are_counted_as_often_as_they_are_referr
     tree: Any = [0.0] * 100
     for _ in range(6):
         tree = [tree] * 100
-    with pytest.raises(DataRefused, match="more than 1000000 entries"):
+    with pytest.raises(DataRefused, match="1000000 entries"):
         plain_tree(tree, "a file")
 
 
@@ -257,7 +257,7 @@ def test_views_of_little_that_are_large_are_refused_before_they_are_copied() -> 
         def element_size(self) -> int:
             return 2
 
-    with pytest.raises(DataRefused, match=r"a file\['b'\]: the arrays of the file take more than 512 MiB"):
+    with pytest.raises(DataRefused, match=r"a file\['b'\]: .*512 MiB"):
         plain_tree({"a": 1.0, "b": View(), "c": View()}, "a file", budget=Budget(bytes=2**29 - 1))
 
 
@@ -265,5 +265,5 @@ def test_an_archive_whose_pickle_is_huge_is_refused_before_torch_reads_it(tmp_pa
     path = tmp_path / "large.pth"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("archive/data.pkl", bytes(2**24 + 1))
-    with pytest.raises(DataRefused, match="a pickle of 16 MiB, at most 16"):
+    with pytest.raises(DataRefused, match=r"16 MiB.* 16"):
         read_container(path)

@@ -48,7 +48,7 @@ def test_nodes_and_presses_are_those_of_their_seed() -> None:
     drawn = draw_presses(tb.peg(), points[:5], 1)
     assert ((drawn.depths >= DEPTHS[0]) & (drawn.depths <= DEPTHS[1])).all()
     assert (drawn.tilts <= MOST_TILT).all()
-    with pytest.raises(WrongUse, match="greater than zero"):
+    with pytest.raises(WrongUse, match=r"\b0(\.0)? m"):
         choose_nodes(tb.peg(), 0.0)
 
 
@@ -192,17 +192,17 @@ def test_a_mesh_inside_out_has_no_place_to_touch() -> None:
 
 def test_codes_that_do_not_fit_are_refused() -> None:
     patches = tb.coded().patches
-    with pytest.raises(WrongUse, match="do not fit"):
+    with pytest.raises(WrongUse, match="shapes"):
         codes_graph(replace(patches, mean=patches.mean[:-1]), tb.SENSOR, tb.SKIRT)
     with pytest.raises(WrongUse, match="dome"):
         codes_graph(patches, replace(tb.SENSOR, gel_radius=30e-3), tb.SKIRT)
     with pytest.raises(WrongUse, match="look-ups"):
         codes_graph(patches, tb.SENSOR, tb.SKIRT, lookups=0)
-    with pytest.raises(WrongUse, match="not finite"):
+    with pytest.raises(WrongUse, match="finite"):
         codes_graph(replace(patches, codes=patches.codes * np.inf), tb.SENSOR, tb.SKIRT)
 
 
 def test_maps_of_other_shapes_are_not_compared() -> None:
-    with pytest.raises(WrongUse, match="cannot be compared"):
+    with pytest.raises(WrongUse, match=r"\(2, 3, 4\).*\(2, 4, 3\)"):
         psnr(np.zeros((2, 3, 4)), np.zeros((2, 4, 3)))
     assert psnr(np.zeros((1, 3, 4)), np.full((1, 3, 4), 2e-5))[0] == pytest.approx(40.0)

@@ -30,12 +30,12 @@ def test_rows_of_any_number_are_read_as_float64(kind: Any, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("array", "said"),
     [
-        (np.zeros((2, 4)), "not rows of 3: vertices"),
+        (np.zeros((2, 4)), "rows of 3: vertices"),
         (np.zeros((0, 3)), "0 rows"),
         (np.zeros((1001, 3)), "1001 rows"),
-        (np.zeros((2, 3, 1)), "not rows of 3"),
+        (np.zeros((2, 3, 1)), "rows of 3"),
         (np.array([[0.0, np.nan, 1.0]]), "row 0"),
-        (np.array([["a", "b", "c"]]), "not rows of 3"),
+        (np.array([["a", "b", "c"]]), "rows of 3"),
         (np.zeros((2, 3), np.complex128), "complex"),
         (np.array([[{}, 1, 2]], object), r"no \.npy file of numbers"),
     ],
@@ -50,7 +50,7 @@ def test_a_damaged_file_is_refused(data: bytes, tmp_path: Path) -> None:
     (tmp_path / "q.npy").write_bytes(data)
     with pytest.raises(DataRefused, match=r"no \.npy file of numbers"):
         read_rows(tmp_path / "q.npy", 3, "vertices")
-    with pytest.raises(WrongUse, match="there is no query file"):
+    with pytest.raises(WrongUse, match=r"none\.npy"):
         read_rows(tmp_path / "none.npy", 3, "vertices")
 
 
@@ -58,7 +58,7 @@ def test_a_point_outside_of_the_trained_box_is_named_and_one_at_its_rim_is_not()
     low, high = np.array([-0.1, 0.0, 0.2]), np.array([0.1, 0.3, 0.4])
     rim = np.stack([low, high]).astype(np.float32).astype(np.float64)
     require_trained(rim, low, high, "strike", "m")
-    with pytest.raises(OutOfDomain, match=r"strike 1 at \(0, 0\.31, 0\.3\) m .*1 of 2"):
+    with pytest.raises(OutOfDomain, match=r"strike 1 .*\(0, 0\.31, 0\.3\) m .*1 of 2"):
         require_trained(np.array([[0.0, 0.1, 0.3], [0.0, 0.31, 0.3]]), low, high, "strike", "m")
 
 
@@ -90,9 +90,9 @@ def test_the_middle_of_a_picture_looks_along_the_axis_and_depth_is_one() -> None
 @pytest.mark.parametrize(
     ("row", "compat", "said"),
     [
-        ((2.0, 0.0, 0.0, 0.0, 0.0, 1.0), True, "camera 0 is 2 from the origin"),
-        ((2.5, 0.0, 0.0, 0.0, 0.0, 0.9), True, "light 0 has the length 0.9"),
-        ((0.9, 0.0, 0.0, 0.0, 0.0, 1.0), False, "within the object's 1"),
+        ((2.0, 0.0, 0.0, 0.0, 0.0, 1.0), True, "camera 0 is 2 "),
+        ((2.5, 0.0, 0.0, 0.0, 0.0, 0.9), True, "light 0 .*0.9"),
+        ((0.9, 0.0, 0.0, 0.0, 0.0, 1.0), False, "camera 0 .* 1"),
         ((2.5, 0.0, 0.0, 0.0, 0.0, 0.0), False, "light 0 is zero"),
     ],
 )

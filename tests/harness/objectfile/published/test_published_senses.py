@@ -150,9 +150,9 @@ def test_a_thousandth_within_the_faces_of_its_cube_a_look_is_empty(second: Publi
 def test_a_sense_of_version_1_without_bounds_refuses_in_one_sentence(first: PublishedObject) -> None:
     entry = first.description.audio_spectrum
     assert entry is not None
-    with pytest.raises(WrongUse, match=r"imported without the bounds .*--audio-bounds LOW HIGH"):
+    with pytest.raises(WrongUse, match="--audio-bounds LOW HIGH"):
         spectrum_sounds(first, entry, POINT, np.ones((1, 3)))
-    with pytest.raises(WrongUse, match=r"imported without the bounds .*--touch-bounds LOW HIGH"):
+    with pytest.raises(WrongUse, match="--touch-bounds LOW HIGH"):
         touch_images(first, colours(first), POINT)
 
 
@@ -219,9 +219,9 @@ def _pack(folder: Path) -> Path:
 
 
 def test_a_folder_of_either_kind_is_not_taken_for_the_other(second: PublishedObject, tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match=r"imported from a published file, .*object render queries"):
+    with pytest.raises(WrongUse, match="object render queries"):
         ObjectFile.open(second.folder)
-    with pytest.raises(WrongUse, match="built from a mesh"):
+    with pytest.raises(WrongUse, match="ObjectFile"):
         PublishedObject.open(egg_file(tmp_path / "built").folder)
 
 
@@ -234,7 +234,7 @@ def test_everything_of_an_imported_folder_is_verified_and_damage_is_found(tmp_pa
     path.write_bytes(bytes(data))
     assert "vision_fine.onnx: bytes" in [check.name for check in verify(of) if not check.passed]
     (of.folder / "audio.onnx").unlink()
-    with pytest.raises(DataRefused, match=r"audio\.onnx is missing"):
+    with pytest.raises(DataRefused, match=r"audio\.onnx"):
         mode_gains(of, gains(of), POINT)
 
 
@@ -252,5 +252,5 @@ def test_a_description_of_another_kind_is_refused(
 ) -> None:
     tree = json.loads((second.folder / "object.json").read_text())
     (tmp_path / "object.json").write_text(json.dumps(tree | change))
-    with pytest.raises((DataRefused, WrongUse), match=said if said != "kind" else "built from a mesh"):
+    with pytest.raises((DataRefused, WrongUse), match=said if said != "kind" else "ObjectFile"):
         PublishedObject.open(tmp_path)

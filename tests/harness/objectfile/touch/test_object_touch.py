@@ -84,9 +84,9 @@ def test_a_graph_asked_for_some_inputs_and_not_others_says_so(peg_object: Object
     touch = open_touch(peg_object, "codes")
     assert isinstance(touch.maps, CodeMaps)
     asked = touch.maps.nodes.queries(presses())
-    with pytest.raises(DataRefused, match="cannot be run"):
+    with pytest.raises(DataRefused, match="onnxruntime"):
         touch.maps.network({name: array[:0] for name, array in asked.items() if name == "node"})
-    with pytest.raises(DataRefused, match="cannot be run"):
+    with pytest.raises(DataRefused, match="onnxruntime"):
         touch.maps.network({name: array[: 0 if name == "node" else None] for name, array in asked.items()})
 
 
@@ -94,11 +94,11 @@ def test_a_graph_asked_for_some_inputs_and_not_others_says_so(peg_object: Object
 def test_what_a_touch_was_not_made_for_is_refused_and_not_clamped(peg_object: ObjectFile, level: Any) -> None:
     touch, asked = open_touch(peg_object, level), presses()
     for depth in (2.51e-3, -1e-5):
-        with pytest.raises(OutOfDomain, match=r"knows 0 to 2\.5 mm"):
+        with pytest.raises(OutOfDomain, match=r"0 to 2\.5 mm"):
             touch.at(replace(asked, depths=np.full(6, depth)))
-    with pytest.raises(OutOfDomain, match="knows 0 to 26 deg"):
+    with pytest.raises(OutOfDomain, match="0 to 26 deg"):
         touch.at(replace(asked, tilts=np.full(6, np.radians(26.1))))
-    with pytest.raises(OutOfDomain, match="off the surface"):
+    with pytest.raises(OutOfDomain, match=" mm"):
         touch.at(replace(asked, points=asked.points + 0.01))
     for depth in (0.0, 2.5e-3):
         touch.at(replace(asked, depths=np.full(6, depth), tilts=np.full(6, np.radians(26.0))))
@@ -121,7 +121,7 @@ def test_levels_that_are_not_there_are_said(peg_object: ObjectFile, egg_object: 
     with pytest.raises(DataRefused, match="--only touch"):
         open_touch(egg_object)
     wrong: Any = "fine"
-    with pytest.raises(WrongUse, match="there is codes and reference"):
+    with pytest.raises(WrongUse, match=r"'fine'.*codes.*reference"):
         open_touch(peg_object, wrong)
 
 
@@ -143,7 +143,7 @@ def test_an_object_with_the_perceptron_of_an_earlier_version_still_opens(
     assert not failures(of)
     assert open_touch(of, "reference").at(presses()).any()
     if alone:
-        with pytest.raises(DataRefused, match=r"only a perceptron.*add codes with .*--only touch"):
+        with pytest.raises(DataRefused, match=r"perceptron.*--only touch"):
             open_touch(of)
     else:
         assert open_touch(of).at(presses()).any()
@@ -152,7 +152,7 @@ def test_an_object_with_the_perceptron_of_an_earlier_version_still_opens(
 
 
 def test_a_touch_of_nothing_is_no_touch(spoiled_peg: Path) -> None:
-    with pytest.raises(DataRefused, match="neither codes nor a perceptron"):
+    with pytest.raises(DataRefused, match="perceptron"):
         rewrite(spoiled_peg, lambda tree: tree["touch"].update(codes=None))
 
 
@@ -161,7 +161,7 @@ def test_a_changed_file_is_refused(spoiled_peg: Path, name: str) -> None:
     data = bytearray((spoiled_peg / name).read_bytes())
     data[-1] ^= 1
     (spoiled_peg / name).write_bytes(data)
-    with pytest.raises(DataRefused, match="was changed"):
+    with pytest.raises(DataRefused, match="sha256"):
         open_touch(ObjectFile.open(spoiled_peg))
     assert f"{name}: bytes" in failures(ObjectFile.open(spoiled_peg))
 
@@ -177,7 +177,7 @@ def test_nodes_of_another_order_are_told_by_pressing(spoiled_peg: Path) -> None:
 def test_nodes_of_another_number_are_refused(spoiled_peg: Path) -> None:
     nodes = tb.coded().nodes
     of = exchange(spoiled_peg, "touch_nodes.npy", nodes_bytes(nodes[np.arange(5)]))
-    with pytest.raises(DataRefused, match="5 nodes, its graph another number"):
+    with pytest.raises(DataRefused, match="5 nodes"):
         open_touch(of)
 
 
@@ -185,23 +185,23 @@ def test_a_description_that_contradicts_itself_is_refused(spoiled_peg: Path) -> 
     def narrow(tree: dict[str, Any]) -> None:
         tree["touch"]["gel"]["rows"] = 23
 
-    with pytest.raises(DataRefused, match="where touch has"):
+    with pytest.raises(DataRefused, match=r"\b23\b"):
         rewrite(spoiled_peg, narrow)
 
     def turn(tree: dict[str, Any]) -> None:
         tree["touch"]["gel"]["rows"] = tb.SENSOR.rows
         tree["touch"]["depth_m"] = [2e-3, 5e-4]
 
-    with pytest.raises(DataRefused, match="the lesser comes first"):
+    with pytest.raises(DataRefused, match="depth_m"):
         rewrite(spoiled_peg, turn)
 
 
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (b"no array", "no .npy file of numbers"),
-        (nodes_bytes(SurfaceNodes(np.zeros((2, 3)), np.eye(3)[:2]))[:-8], "bytes, not the"),
-        (nodes_bytes(SurfaceNodes(np.full((2, 3), np.nan), np.eye(3)[:2])), "not finite"),
+        (b"no array", ".npy"),
+        (nodes_bytes(SurfaceNodes(np.zeros((2, 3)), np.eye(3)[:2]))[:-8], "bytes"),
+        (nodes_bytes(SurfaceNodes(np.full((2, 3), np.nan), np.eye(3)[:2])), "finite"),
         (nodes_bytes(SurfaceNodes(np.zeros((2, 3)), np.ones((2, 3)))), "length 1"),
         (nodes_bytes(SurfaceNodes(np.zeros((0, 3)), np.zeros((0, 3)))), r"float64 \(n, 6\)"),
     ],
