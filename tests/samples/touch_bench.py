@@ -49,7 +49,7 @@ def peg() -> Mesh:
 @cache
 def coded() -> CodedSurface:
     """Codes of the peg."""
-    return code_surface(RasterMesh(peg()), choose_nodes(peg(), SPACING), SENSOR, SPEC, 0)
+    return code_surface(RasterMesh(peg()), choose_nodes(peg(), SPACING), SENSOR, SPEC)
 
 
 @cache

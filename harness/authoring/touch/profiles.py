@@ -14,7 +14,6 @@ class CodesSpec:
     most_bytes: int = 18_000_000
     """of the codes alone, about a megabyte less than their file; nodes are as dense as it allows."""
     pitch: float = 0.5e-3  #: m, of a patch's pixels.
-    width: int | None = None  #: numbers of a code on a linear basis; None for the heights themselves.
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,6 @@
 """From a surface to the codes of its touch, and what they are worth on presses they never saw.
 
-``code_surface`` makes the codes: heights around the nodes, in the linear basis that keeps most of them.
-The basis is that of the principal components. For a linear decoder and squared error no training can
-find a better one (Eckart and Young, Psychometrika 1, 1936), and finding it takes seconds, so there is
-nothing here to descend on.
+``code_surface`` makes the codes: heights around the nodes, over their mean.
 """
 
 import time
@@ -124,7 +121,6 @@ def author_touch(
         "pitch": coded.patches.pitch,
         "spacing": spacing,
         "nodes": len(coded.nodes),
-        "variance_kept": coded.kept,
     }
     codes = CodesPart(graph, coded.nodes, bench.most_off, measured)
     return AuthoredTouch(codes, errors, settings, seconds)
@@ -142,7 +138,6 @@ class CodedSurface:
 
     nodes: SurfaceNodes  #: those of a surface that a gel can come to.
     patches: PatchCodes  #: their codes.
-    kept: float  #: share of the variance of heights that the basis keeps.
 
 
 def spaced_codes(
@@ -157,7 +152,7 @@ def spaced_codes(
         WrongUse: it allows none of ``SPACINGS`` with pixels of any pitch.
     """
     for coarsened in COARSENED:
-        patches = [PatchSpec(spacing, coarsened * spec.pitch, spec.width) for spacing in SPACINGS]
+        patches = [PatchSpec(spacing, coarsened * spec.pitch) for spacing in SPACINGS]
         for patch in patches:
             each = patch_bytes(sensor, patch)
             # Whoever needs more room than a node for each square of the spacing need not be counted.
@@ -165,7 +160,7 @@ def spaced_codes(
                 continue
             nodes = choose_nodes(raster.mesh, patch.spacing, seed)
             if len(nodes) * each <= spec.most_bytes:
-                return code_surface(raster, nodes, sensor, patch, seed), patch.spacing
+                return code_surface(raster, nodes, sensor, patch), patch.spacing
     raise WrongUse(
         f"the object's surface, {raster.mesh.face_areas.sum() * 1e4:.4g} cm^2, does not fit into codes of "
         f"{spec.most_bytes / 1e6:.3g} MB even with nodes {SPACINGS[-1] * 1e3:g} mm apart and pixels of "
@@ -179,12 +174,10 @@ class PatchSpec:
 
     spacing: float  #: m between nodes.
     pitch: float  #: m, of a patch's pixels.
-    width: int | None = None  #: numbers of a code; None for the heights themselves.
-    learned: int = 2000  #: patches that the basis is found from, at most.
 
 
 def code_surface(
-    raster: RasterMesh, nodes: SurfaceNodes, sensor: TactileSensor, spec: PatchSpec, seed: int
+    raster: RasterMesh, nodes: SurfaceNodes, sensor: TactileSensor, spec: PatchSpec
 ) -> CodedSurface:
     """Look at a surface from its nodes, and code what is seen.
 
@@ -193,7 +186,6 @@ def code_surface(
         nodes: of its surface (``touch_data.choose_nodes`` with the same spacing).
         sensor: whose window the patches cover, however it is turned.
         spec: of patches and codes.
-        seed: of the patches that the basis is found from.
 
     Raises:
         WrongUse: no node is to be seen.
@@ -205,46 +197,16 @@ def code_surface(
     nodes = nodes[seen]
     if len(nodes) == 0:
         raise WrongUse("no place of the surface can be touched from outside; is the mesh inside out?")
-    if spec.width is None:
-        heights, cover = viewer.seen(nodes, np.arange(len(nodes)))
-        mean = heights.mean(axis=0)
-        return CodedSurface(nodes, viewer.patches(heights - mean, None, mean, cover), 1.0)
-    chosen = np.sort(np.random.default_rng([seed, 7]).permutation(len(nodes))[: spec.learned])
-    learned = viewer.seen(nodes, chosen)[0]
-    mean = learned.mean(axis=0)
-    basis, kept = principal(learned - mean, spec.width)
-    codes = np.empty((len(nodes), len(basis)))
-    cover = np.empty((len(nodes), len(mean)), np.uint8)
-    for first in range(0, len(nodes), _CHUNK):
-        part = np.arange(first, min(first + _CHUNK, len(nodes)))
-        heights, cover[part] = viewer.seen(nodes, part)
-        codes[part] = (heights - mean) @ basis.T
-    return CodedSurface(nodes, viewer.patches(codes, basis, mean, cover), kept)
+    heights, cover = viewer.seen(nodes, np.arange(len(nodes)))
+    mean = heights.mean(axis=0)
+    patches = PatchCodes(heights - mean, mean, cover, viewer.inside, viewer.outside, viewer.pitch)
+    return CodedSurface(nodes, patches)
 
 
 def patch_bytes(sensor: TactileSensor, spec: PatchSpec) -> float:
-    """Bytes of one code in a file, in half precision; a basis is counted with the codes that share it."""
+    """Bytes of one code in a file: heights in half precision, and covers."""
     pixels = np.pi * (_radius(sensor, spec) / spec.pitch) ** 2
-    heights = pixels if spec.width is None else spec.width * (1.0 + pixels / spec.learned)
-    return float(2.0 * heights + pixels)
-
-
-def principal(rows: FloatArray, width: int) -> tuple[FloatArray, float]:
-    """``(k, pixels)`` orthonormal directions of greatest variance, and the share of it that they keep."""
-    gram = rows @ rows.T
-    values, vectors = np.linalg.eigh(gram)
-    values = np.maximum(values[::-1], 0.0)
-    k = max(1, min(width, int(np.count_nonzero(values > 1e-12 * max(values[0], 1e-300)))))
-    basis = vectors[:, ::-1][:, :k].T @ rows
-    lengths = np.linalg.norm(basis, axis=1, keepdims=True)
-    # The sign of an eigenvector is the solver's whim; files are to be the same every time.
-    signs = np.sign(basis[np.arange(k), np.abs(basis).argmax(axis=1)])[:, None]
-    whole = float(values.sum())
-    kept = float(values[:k].sum()) / whole if whole > 0.0 else 1.0
-    directions: FloatArray = (
-        basis * np.where(signs == 0.0, 1.0, signs) / np.where(lengths > 0.0, lengths, 1.0)
-    )
-    return directions, kept
+    return float(3.0 * pixels)
 
 
 class _Viewer:
@@ -297,12 +259,6 @@ class _Viewer:
             flat = whole[:, self.inside]
             found[part] = np.clip(np.where(np.isnan(flat), self._limit, flat), -self._limit, self._limit)
         return found, cover
-
-    def patches(
-        self, codes: FloatArray, basis: FloatArray | None, mean: FloatArray, cover: ByteArray
-    ) -> PatchCodes:
-        """Codes of what is seen."""
-        return PatchCodes(codes, basis, mean, cover, self.inside, self.outside, self.pitch)
 
 
 def _radius(sensor: TactileSensor, spec: PatchSpec) -> float:

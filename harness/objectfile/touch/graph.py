@@ -1,8 +1,8 @@
 """The graph of an object's touch: a code of the surface around a place, seen from a pressed gel.
 
-*The code.* Around each of many nodes of the surface, the heights over the tangent plane are a mean and a
-linear basis times the node's code; beside them is how much of each pixel the surface covers, which says
-where it ends to a part of a pixel. *The press in closed form.* Where the gel stands in the frame of the
+*The code.* Around each of many nodes of the surface, the heights over the tangent plane are a mean and the
+node's code; beside them is how much of each pixel the surface covers, which says where it ends to a part of a
+pixel. *The press in closed form.* Where the gel stands in the frame of the
 node is a rigid motion; a pixel of the gel is a ray through those heights, and where it meets them is
 found by looking up, moving along the ray to the height that was found, and looking up again. So tilt,
 azimuth, yaw, depth and the way from the node to the contact cost the code nothing: it need not have
@@ -49,9 +49,7 @@ class PatchCodes:
     of the node's frame, whose z axis points into the object.
     """
 
-    codes: FloatArray  #: ``(nodes, k)`` m.
-    basis: FloatArray | None
-    """``(k, pixels)``, of the pixels inside; None where a code is the pixels themselves."""
+    codes: FloatArray  #: ``(nodes, pixels)`` m, of the pixels inside.
     mean: FloatArray  #: ``(pixels,)`` m, which is added.
     cover: ByteArray  #: ``(nodes, pixels)`` uint8, the share of a pixel that is surface in reach, times 255.
     inside: BoolArray  #: ``(size, size)``: the pixels that a code says something of.
@@ -61,8 +59,7 @@ class PatchCodes:
     def heights(self, node: int) -> FloatArray:
         """``(size, size)`` m, as the graph takes them to be."""
         patch = np.full(self.inside.shape, self.outside)
-        code = self.codes[node]
-        patch[self.inside] = self.mean + (code if self.basis is None else code @ self.basis)
+        patch[self.inside] = self.mean + self.codes[node]
         return patch
 
     def covers(self, node: int) -> FloatArray:
@@ -86,7 +83,7 @@ def codes_graph(
         sensor: a flat gel; no press goes deeper than it is thick.
         skirt: of the gel, in its pixels.
         lookups: along each ray, 1 or more.
-        storage: of codes and basis in the file; computed is in float32.
+        storage: of codes in the file; computed is in float32.
 
     Raises:
         WrongUse: arrays that do not fit together or are not finite, or a dome.
@@ -143,20 +140,14 @@ def _patch(nodes: Nodes, patches: PatchCodes) -> tuple[str, str]:
     size = len(patches.inside)
     asked = nodes.add("Reshape", "node", shape_of(nodes, -1))
     # In half precision what is below 60 um would be lost, were it metres.
-    millimetres = patches.codes * 1e3
-    if patches.basis is None:
-        millimetres = np.hstack([millimetres, np.zeros((len(millimetres), 1))])
+    millimetres = np.hstack([patches.codes * 1e3, np.zeros((len(patches.codes), 1))])
     code = nodes.add("Gather", nodes.weight(millimetres, "the codes"), asked, axis=0)
     # All pixels outside read one column behind the others: no code, and the height of outside.
     pixels = len(patches.mean)
     columns = np.full(patches.inside.shape, pixels)
     columns[patches.inside] = np.arange(pixels)
     index = nodes.constant(columns.ravel().astype(np.int64))
-    if patches.basis is None:
-        flat = _columns(nodes, code, index)
-    else:
-        held = nodes.weight(np.hstack([patches.basis, np.zeros((len(patches.basis), 1))]), "the basis")
-        flat = nodes.add("MatMul", code, nodes.add("Gather", held, index, axis=1))
+    flat = _columns(nodes, code, index)
     mean = np.append(patches.mean, patches.outside)[columns.ravel()].astype(np.float32)
     metres = nodes.add("Mul", flat, nodes.constant(np.array(1e-3, np.float32)))
     above = nodes.add("Sub", nodes.constant(mean), nodes.constant(np.array(patches.outside, np.float32)))
@@ -185,12 +176,11 @@ def _check(patches: PatchCodes, sensor: TactileSensor, lookups: int) -> None:
         raise WrongUse(f"{sensor.name} has a dome; codes are seen through a flat gel only")
     if lookups < 1:
         raise WrongUse(f"{lookups} look-ups find nothing; say 1 or more")
-    (count, width), size = patches.codes.shape, len(patches.inside)
+    count, size = len(patches.codes), len(patches.inside)
     pixels = int(np.count_nonzero(patches.inside))
-    basis = (pixels, pixels) if patches.basis is None else patches.basis.shape
-    shapes = (basis, patches.mean.shape, patches.inside.shape)
-    if count < 1 or shapes != ((width, pixels), (pixels,), (size, size)):
-        raise WrongUse(f"codes {patches.codes.shape} with basis, mean and mask of shapes {shapes} do not fit")
+    shapes = (patches.codes.shape, patches.mean.shape, patches.inside.shape)
+    if count < 1 or shapes != ((count, pixels), (pixels,), (size, size)):
+        raise WrongUse(f"codes, mean and mask of shapes {shapes} do not fit")
     if patches.cover.shape != (count, pixels) or patches.cover.dtype != np.uint8:
         raise WrongUse(
             f"covers {patches.cover.dtype} {patches.cover.shape} are to be uint8 {(count, pixels)}"

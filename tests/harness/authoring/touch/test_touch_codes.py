@@ -1,4 +1,4 @@
-"""Codes of a surface against the rasteriser: laws of presses, accuracy, and what a basis costs."""
+"""Codes of a surface against the rasteriser: laws of presses, accuracy."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from harness.authoring.touch.data import DEPTHS, MOST_TILT, choose_nodes, draw_presses, reference_maps
+from harness.authoring.touch.data import DEPTHS, MOST_TILT, choose_nodes, draw_presses
 from harness.authoring.touch.metrics import psnr
-from harness.authoring.touch.touch import code_surface, opened_codes, principal
+from harness.authoring.touch.touch import code_surface, opened_codes
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
@@ -161,33 +161,10 @@ def test_a_blur_by_products_is_the_blur(width: int) -> None:
     np.testing.assert_allclose(found, wanted, atol=1e-6)
 
 
-def test_a_basis_as_wide_as_the_codes_loses_nothing_and_a_narrow_one_something() -> None:
-    raster, nodes = RasterMesh(tb.peg()), tb.coded().nodes
-    whole = code_surface(raster, nodes, tb.SENSOR, replace(tb.SPEC, width=10_000), 0)
-    assert whole.kept == pytest.approx(1.0)
-    np.testing.assert_allclose(whole.patches.heights(3), tb.coded().patches.heights(3), atol=1e-9)
-    narrow = code_surface(raster, nodes, tb.SENSOR, replace(tb.SPEC, width=8), 0)
-    assert 0.5 < narrow.kept < 0.9999
-    graph = codes_graph(narrow.patches, tb.SENSOR, tb.SKIRT)
-    found = opened_codes(graph, nodes, 1.0, tb.SENSOR)
-    presses = tb.bench().at_nodes(tb.maps(), 20, 1).presses
-    truth = reference_maps(raster, presses, tb.SENSOR, tb.SKIRT).maps
-    assert np.median(psnr(found(presses), truth)) < np.median(psnr(tb.maps()(presses), truth)) - 6.0
-
-
-def test_principal_directions_are_orthonormal_and_best() -> None:
-    rows = np.random.default_rng(1).normal(size=(30, 4)) @ np.random.default_rng(2).normal(size=(4, 50))
-    basis, kept = principal(rows, 4)
-    np.testing.assert_allclose(basis @ basis.T, np.eye(4), atol=1e-9)
-    np.testing.assert_allclose(rows @ basis.T @ basis, rows, atol=1e-9)
-    assert kept == pytest.approx(1.0)
-    assert principal(np.zeros((3, 5)), 2)[0].shape == (1, 5)
-
-
 def test_a_mesh_inside_out_has_no_place_to_touch() -> None:
     mesh = Mesh(tb.peg().vertices, tb.peg().faces[:, ::-1])
     with pytest.raises(WrongUse, match="inside out"):
-        code_surface(RasterMesh(mesh), choose_nodes(mesh, tb.SPACING), tb.SENSOR, tb.SPEC, 0)
+        code_surface(RasterMesh(mesh), choose_nodes(mesh, tb.SPACING), tb.SENSOR, tb.SPEC)
 
 
 def test_codes_that_do_not_fit_are_refused() -> None:

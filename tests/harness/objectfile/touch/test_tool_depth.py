@@ -146,7 +146,7 @@ def post(tmp_path_factory: pytest.TempPathFactory) -> tuple[CodedDepth, Mesh]:
     raised = pole.vertices + np.array([0.0, 0.0, 0.02])
     faces = np.concatenate([plate.faces, pole.faces + len(plate.vertices)])
     mesh = Mesh(np.concatenate([plate.vertices, raised]), faces)
-    coded = code_surface(RasterMesh(mesh), choose_nodes(mesh, tb.SPACING), tb.SENSOR, tb.SPEC, 0)
+    coded = code_surface(RasterMesh(mesh), choose_nodes(mesh, tb.SPACING), tb.SENSOR, tb.SPEC)
     codes = CodesPart(codes_graph(coded.patches, tb.SENSOR, tb.SKIRT), coded.nodes, OFF * tb.SPACING)
     part = replace(tb.peg_part(), codes=codes)
     folder = tmp_path_factory.mktemp("objects") / "post"
