@@ -1,6 +1,5 @@
 """What is built of every object of a catalogue, and the keys by which results are found again."""
 
-import hashlib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from harness.authoring.touch.profiles import touch_profile
 from harness.authoring.vision.profiles import vision_profile
 from harness.basics.code_version import content_hash
 from harness.basics.errors import WrongUse
+from harness.basics.files.foreign_file import sha256_of
 from harness.basics.files.named_file import nearest, require_file
 from harness.basics.materials import MATERIALS
 from harness.basics.store import digest
@@ -108,7 +108,7 @@ def _surface_key(mesh: str) -> list[str]:
         return [mesh, content_hash("harness.objects.builtin")]
     path = Path(mesh)
     require_file(path, "mesh file")
-    return [path.name, _sha256(path)]
+    return [path.name, sha256_of(path)]
 
 
 def _colours_key(mesh: str) -> list[str]:
@@ -117,7 +117,7 @@ def _colours_key(mesh: str) -> list[str]:
     if mesh.startswith(BUILTIN) or path.suffix.lower() != ".obj":
         return [content_hash("harness.sim.light.appearance_source")] if mesh.startswith(BUILTIN) else []
     libraries = _named_files([path], _NAMES_A_LIBRARY)
-    return [_sha256(each) for each in (*libraries, *_named_files(libraries, _NAMES_A_PICTURE))]
+    return [sha256_of(each) for each in (*libraries, *_named_files(libraries, _NAMES_A_PICTURE))]
 
 
 def _named_files(paths: Sequence[Path], pattern: re.Pattern[bytes]) -> list[Path]:
@@ -128,8 +128,3 @@ def _named_files(paths: Sequence[Path], pattern: re.Pattern[bytes]) -> list[Path
         for name in dict.fromkeys(pattern.findall(path.read_bytes()))
     ]
     return [path for path in named if path.is_file()]
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

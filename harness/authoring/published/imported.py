@@ -9,10 +9,11 @@ import numpy as np
 from harness.authoring.published.layout import FileTable, State, format_of
 from harness.authoring.published.look import take_first_look, take_look
 from harness.authoring.published.parts import ImportedParts
-from harness.authoring.published.reader import read_container, sha256_of
+from harness.authoring.published.reader import read_container
 from harness.basics.arrays import FloatArray
 from harness.basics.code_version import content_hash
 from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.files.foreign_file import sha256_of
 from harness.objectfile.description import PUBLISHED, SCHEMA, model_from
 from harness.objectfile.entries import Domain, Input, NetworkEntry, Provenance, Source, Tensor
 from harness.objectfile.file import file_entry, write_described

@@ -6,7 +6,6 @@ constructors would take any dtype, objects and padded structures among them; the
 little-endian numbers and booleans, as many bytes as their shape has. Any other name in the file is refused.
 """
 
-import hashlib
 import math
 import pickle
 import zipfile
@@ -20,7 +19,12 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused, WrongUse
-from harness.basics.files.foreign_file import MOST_DATA, refused_as, require_readable, require_unpackable
+from harness.basics.files.foreign_file import (
+    MOST_DATA,
+    refused_as,
+    require_readable,
+    require_unpackable,
+)
 from harness.basics.files.named_file import require_file
 
 Tree = Any
@@ -46,18 +50,7 @@ def read_container(path: Path) -> Tree:
         DataRefused: it is foreign or cut short, or asks for code to be run.
     """
     require_file(path, "file", "give a published ObjectFile, a .pth file")
-    _require_archive(path)
-    return plain_tree(_loaded(path), path.name)
-
-
-def sha256_of(path: Path) -> str:
-    """Of a file's bytes, hexadecimal."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def _require_archive(path: Path) -> None:
-    """Looked at before torch is: a cut file has lost its table of contents, which stands last."""
+    # Looked at before torch is: a cut file has lost its table of contents, which stands last.
     require_readable(path, "an ObjectFile", MOST_DATA)
     with path.open("rb") as stream:
         if stream.read(2) != b"PK":
@@ -74,6 +67,7 @@ def _require_archive(path: Path) -> None:
         )
     if not any(item.filename.endswith("data.pkl") for item in listed):
         raise DataRefused(f"{path.name} is an archive without torch's data.pkl; {_FOREIGN}")
+    return plain_tree(_loaded(path), path.name)
 
 
 def _loaded(path: Path) -> Any:
@@ -142,7 +136,12 @@ def plain_tree(value: Any, where: str, depth: int = 0, budget: Budget | None = N
             return value
         case Mapping():
             budget.take(where, len(value))
-            return _table(value, where, depth, budget)
+            for key in value:
+                if not isinstance(key, str | int):
+                    raise DataRefused(f"{where} has a key that is a {type(key).__name__}; {_FOREIGN}")
+            return {
+                key: plain_tree(item, f"{where}[{key!r}]", depth + 1, budget) for key, item in value.items()
+            }
         case list() | tuple():
             budget.take(where, len(value))
             return [plain_tree(item, f"{where}[{k}]", depth + 1, budget) for k, item in enumerate(value)]
@@ -152,13 +151,6 @@ def plain_tree(value: Any, where: str, depth: int = 0, budget: Budget | None = N
     if hasattr(value, "detach") and hasattr(value, "numel"):
         return _of_tensor(value, where, budget)
     raise DataRefused(f"{where} is a {type(value).__name__}, of which an ObjectFile has none; {_FOREIGN}")
-
-
-def _table(table: Mapping[Any, Any], where: str, depth: int, budget: Budget) -> dict[Any, Tree]:
-    for key in table:
-        if not isinstance(key, str | int):
-            raise DataRefused(f"{where} has a key that is a {type(key).__name__}; {_FOREIGN}")
-    return {key: plain_tree(item, f"{where}[{key!r}]", depth + 1, budget) for key, item in table.items()}
 
 
 def _of_tensor(tensor: Any, where: str, budget: Budget) -> AnyArray:

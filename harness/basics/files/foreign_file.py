@@ -1,5 +1,6 @@
 """Files that somebody else wrote: read within bounds, and refused in a sentence where they do not read."""
 
+import hashlib
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -57,6 +58,12 @@ def read_bounded(
         return path.read_bytes()
     except OSError as error:
         raise unreadable(path, error) from error
+
+
+def sha256_of(path: Path) -> str:
+    """Return the hash of a file's bytes, hexadecimal."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def unreadable(path: Path, error: OSError) -> WrongUse:

@@ -5,6 +5,7 @@ in a unit that is nowhere stated, the distance from a camera to a gel, raw colou
 cube. Each table names its quantity; what a file does not hold is null and listed under ``missing``.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -164,23 +165,22 @@ class PublishedDescription(Entry):
 
     @property
     def networks(self) -> dict[str, NetworkEntry]:
-        """By sense, those that there are."""
-        vision = self.vision
-        every = {
-            "audio": self.audio_gains or self.audio_spectrum,
-            "touch": self.touch_depth or self.touch_colours,
-            "vision": vision,
-        }
-        found = {name: entry.network for name, entry in every.items() if entry is not None}
-        return found if vision is None or vision.fine is None else {**found, "vision fine": vision.fine}
+        """Networks that there are, by the name of their file: audio, touch, vision, vision fine."""
+        named = ((entry.file.removesuffix(".onnx").replace("_", " "), entry) for entry in self.files)
+        return {name: entry for name, entry in named if isinstance(entry, NetworkEntry)}
 
     @property
     def files(self) -> tuple[FileEntry, ...]:
-        """Every file that the folder must hold, each once."""
-        cells = None if self.vision is None else self.vision.cells
-        voxels = None if self.audio_spectrum is None else self.audio_spectrum.voxels
-        others = (voxels, None, None) if cells is None else (voxels, cells.networks, cells.occupancy)
-        return tuple(entry for entry in (*self.networks.values(), *others) if entry is not None)
+        """Every file that the folder must hold."""
+        return tuple(_files_of(self))
+
+
+def _files_of(table: Entry) -> Iterator[FileEntry]:
+    for _, value in table:
+        if isinstance(value, FileEntry):
+            yield value
+        elif isinstance(value, Entry):
+            yield from _files_of(value)
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,13 +36,14 @@ def query(network: Network, inputs: Mapping[str, AnyArray], rows: int = _BATCH) 
         network({name: array[first : first + rows] for name, array in taken.items()})
         for first in range(0, max(count, 1), rows)
     ]
-    outputs = {
-        tensor.name: np.concatenate([run[tensor.name] for run in runs]).astype(np.float64)
-        for tensor in network.outputs
-    }
-    for name, values in outputs.items():
+    outputs = {}
+    for tensor in network.outputs:
+        values = np.concatenate([run[tensor.name] for run in runs]).astype(np.float64)
         if not np.isfinite(values).all():
-            raise DataRefused(f"{network.name} gives {name} that are not finite; import the file again")
+            raise DataRefused(
+                f"{network.name} gives {tensor.name} that are not finite; import the file again"
+            )
+        outputs[tensor.name] = values
     return outputs
 
 
