@@ -41,16 +41,42 @@ class FileTable:
             raise DataRefused(f"{self.name} has no table {key!r}; {_FOREIGN}")
         return FileTable(f"{self.name}/{key}", found)
 
-    def array(self, key: str, shape: tuple[int | None, ...] | None = None) -> FloatArray:
-        """Return finite numbers of a shape; ``DataRefused`` for others.
+    def array(
+        self,
+        key: str,
+        shape: tuple[int | None, ...] | None = None,
+        kind: type[np.floating[Any]] = np.float64,
+    ) -> FloatArray:
+        """Return finite numbers of a shape; ``DataRefused`` for other shapes, or for text.
 
         Args:
             key: name of the entry.
             shape: sizes, None for any size from 1 up; None for any shape.
+            kind: type of the numbers returned.
         """
         if key not in self.values:
             raise DataRefused(f"{self.name} has no {key!r}; {_FOREIGN}")
-        return checked(self.values[key], shape, f"{self.name}/{key}")
+        name = f"{self.name}/{key}"
+        try:
+            array = np.asarray(self.values[key])
+        except ValueError as error:
+            raise DataRefused(f"{name} is no array") from error
+        wanted = array.shape if shape is None else shape
+        fits = len(array.shape) == len(wanted) and all(
+            found >= 1 if size is None else found == size
+            for found, size in zip(array.shape, wanted, strict=True)
+        )
+        if array.dtype.kind not in "fiub" or not fits:
+            sizes = " x ".join("n" if size is None else str(size) for size in wanted) or "one number"
+            raise DataRefused(f"{name} holds {array.dtype} {array.shape}, where {sizes} belongs")
+        with np.errstate(over="ignore", under="ignore"):
+            numbers: FloatArray = array.astype(kind)
+        if not np.isfinite(numbers).all():
+            bad = int(np.count_nonzero(~np.isfinite(numbers)))
+            raise DataRefused(
+                f"{name} has {bad} of {numbers.size} numbers that are not finite; get the file again"
+            )
+        return numbers
 
     def numbers(self, key: str, count: int = 1) -> FloatArray:
         """Return ``(count,)`` float64 from one number for all, or from as many in any shape."""
@@ -82,34 +108,6 @@ class FileTable:
         return low, high
 
 
-def checked(
-    value: Any,
-    shape: tuple[int | None, ...] | None,
-    name: str,
-    kind: type[np.floating[Any]] = np.float64,
-) -> FloatArray:
-    """Convert to finite numbers of a shape; ``DataRefused`` for other shapes, or for text."""
-    try:
-        array = np.asarray(value)
-    except ValueError as error:
-        raise DataRefused(f"{name} is no array") from error
-    wanted = array.shape if shape is None else shape
-    fits = len(array.shape) == len(wanted) and all(
-        found >= 1 if size is None else found == size for found, size in zip(array.shape, wanted, strict=True)
-    )
-    if array.dtype.kind not in "fiub" or not fits:
-        sizes = " x ".join("n" if size is None else str(size) for size in wanted) or "one number"
-        raise DataRefused(f"{name} holds {array.dtype} {array.shape}, where {sizes} belongs")
-    with np.errstate(over="ignore", under="ignore"):
-        numbers: FloatArray = array.astype(kind)
-    if not np.isfinite(numbers).all():
-        bad = int(np.count_nonzero(~np.isfinite(numbers)))
-        raise DataRefused(
-            f"{name} has {bad} of {numbers.size} numbers that are not finite; get the file again"
-        )
-    return numbers
-
-
 def format_of(tree: Any, name: str) -> Format:
     """Determine which version published a file.
 
@@ -138,12 +136,10 @@ def format_of(tree: Any, name: str) -> Format:
     return found.pop()
 
 
-@dataclass(eq=False)
-class State:
-    """The weights of a network by name; names that no layer reads are reported, not ignored."""
+@dataclass(frozen=True, eq=False)
+class State(FileTable):
+    """The weights of a network by name, without torch's prefix; names that no layer reads are reported."""
 
-    name: str  #: path of the weights in the file, for messages.
-    values: Mapping[str, Any]  #: arrays by name, without torch's prefix.
     used: set[str] = field(default_factory=set)  #: names that were read.
 
     @classmethod
@@ -160,19 +156,17 @@ class State:
             raise DataRefused(f"{table.name} has two weights of one name behind {_PREFIX!r}")
         return cls(table.name, values)
 
-    def array(self, name: str, axes: int) -> AnyArray:
+    def weights(self, name: str, axes: int) -> AnyArray:
         """Return the float32 weights of a name; numbers too small for normal float32 become zero."""
-        if name not in self.values:
-            raise DataRefused(f"{self.name} has no {name!r}; it is no network as ObjectFolder publishes them")
+        array = self.array(name, (None,) * axes, np.float32)
         self.used.add(name)
-        array = checked(self.values[name], (None,) * axes, f"{self.name}/{name}", np.float32)
         # Subnormal weights are noise, and slow every product they enter.
         array[np.abs(array) < np.finfo(np.float32).smallest_normal] = 0.0
         return array
 
     def outputs(self, layer: str, axes: int = 1) -> int:
         """Return the number of outputs of a layer, whose bias has so many axes."""
-        return int(self.array(f"{layer}.bias", axes).shape[-1])
+        return int(self.weights(f"{layer}.bias", axes).shape[-1])
 
     def unused(self) -> dict[str, int]:
         """Count the numbers that nothing uses, by name.

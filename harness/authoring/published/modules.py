@@ -6,8 +6,7 @@ programs do, with the input's normaliser and the output's scale inside.
 
 import logging
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 
 import torch
 from onnx import ModelProto
@@ -232,7 +231,7 @@ def load_weights(module: nn.Module, state: State, prefix: str = "", cells: BoolA
         DataRefused: weights that are missing, not finite, or of shapes that do not fit together.
     """
     for name, parameter in module.named_parameters():
-        array = state.array(prefix + name, parameter.ndim)
+        array = state.weights(prefix + name, parameter.ndim)
         if cells is not None and len(array) != len(cells):
             raise DataRefused(
                 f"{state.name}/{name} has {len(array)} networks where there are {len(cells)} cells"
@@ -259,7 +258,10 @@ def exported_graph(
     """
     rows = torch.export.Dim("n")
     examples = tuple(torch.zeros((2, *item.shape[1:]), dtype=getattr(torch, item.dtype)) for item in inputs)
-    with _quiet():
+    # The exporter's progress and its notes about missing packages stay off the terminal.
+    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
         program = torch.onnx.export(
             module.eval(),
             examples,
@@ -281,17 +283,3 @@ def exported_graph(
     graph.name = outputs[0].name
     model.doc_string = doc
     return model
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep the exporter's progress and its notes about missing packages off the terminal."""
-    logger = logging.getLogger("torch.onnx")
-    level = logger.level
-    logger.setLevel(logging.ERROR)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        logger.setLevel(level)
