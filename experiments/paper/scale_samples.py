@@ -1,7 +1,6 @@
 """Samples that the paper's networks learn from: pictures, single strikes and imprints of the same shapes."""
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
@@ -82,11 +81,6 @@ PAPER_MAKERS: dict[str, Callable[[int, int, int], list[SampleRow]]] = {
     "spectrogram": single_strikes,
     "imprints": imprint_sequences,
 }
-
-
-def paper_maker(sense: str, seed: int, count: int) -> Callable[[int], list[SampleRow]]:
-    """The rows of one shape by its number."""
-    return partial(PAPER_MAKERS[sense], seed, count)
 
 
 def _white(mesh: Mesh) -> LitObject:

@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from experiments.paper.scale_networks import FRAMES, HOP, LINES, SIDE, SIZE_INPUTS, STEPS, WINDOW
-from experiments.paper.scale_samples import paper_maker
+from experiments.paper.scale_samples import PAPER_MAKERS
 from experiments.paper.train import SizeAmounts
 from experiments.scale_estimation.unseen import contact_set
 from experiments.scale_estimation.unseen.training.samples import SIZES, SizeSamples, gathered
@@ -171,7 +172,8 @@ def train_paper_network(
     sense: str, amounts: SizeAmounts, seed: int, processes: int
 ) -> tuple[bytes, dict[str, Any]]:
     """The graph's bytes and its card; held out are the shapes that the shipped networks' cards hold out."""
-    samples = gathered(paper_maker(sense, seed, amounts.samples[sense]), amounts.shapes, processes, sense)
+    make = partial(PAPER_MAKERS[sense], seed, amounts.samples[sense])
+    samples = gathered(make, amounts.shapes, processes, sense)
     unused, tested_shapes = (round(share * amounts.shapes) for share in HELD_OUT)
     last = amounts.shapes - unused - tested_shapes
     learnt = samples.of(samples.shapes < last)

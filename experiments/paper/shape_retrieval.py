@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from scipy.spatial.distance import cdist
 from experiments.shape_reconstruction.estimators.contact_samples import ContactSamples, all_samples, thinned
 from experiments.shape_reconstruction.estimators.free_space import (
     Silhouette,
-    depth_of_touches,
+    sensor_depth,
     silhouette_of,
 )
 from experiments.shape_reconstruction.estimators.knowledge import (
@@ -265,7 +265,8 @@ def _with_cost(
     cost = float(np.log1p((apart / SCALE) ** 2).mean() + np.log1p((angle / NORMAL) ** 2).mean())
     own = at.outward(at.shape.samples[1][:_COST_SAMPLES])
     # One term for each touch, so that one that is impossible there is not outweighed by the area.
-    cost += float(np.log1p((depth_of_touches(evidence, own) / _FREE) ** 2).mean())
+    depths = [sensor_depth(replace(evidence, touches=(one,)), own).max() for one in evidence.distinct]
+    cost += float(np.log1p((np.maximum(depths, 0.0) / _FREE) ** 2).mean())
     if silhouette is not None:
         cost += _picture_cost(own, silhouette)
     # Presses reach the outside evenly: the density of each is the inverse of its area.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from experiments.shape_reconstruction.evidence import GuardedTouch, SeenMask, ShapeEvidence
+from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply, inverse
 
@@ -21,26 +21,18 @@ _CONTACT_BEYOND = 0.7
 
 
 def sensor_depth(evidence: ShapeEvidence, points: FloatArray) -> FloatArray:
-    """``(n,)`` m that ``(n, 3)`` points are deep in what the sensor's housing passed; below 0 beside it."""
+    """``(n,)`` m that ``(n, 3)`` points are deep in what the sensor's housing passed; below 0 beside it.
+
+    The housing and all the space it came through are one box, since its way is straight along its axis.
+    """
     deepest = np.full(len(points), -np.inf)
     for touch in evidence.distinct:
-        np.maximum(deepest, _depth_in_housing(evidence, touch, points), out=deepest)
+        in_gel = apply(inverse(touch.stand_from_gel), points)
+        beside = 0.5 * np.array(evidence.housing) - np.abs(in_gel[:, :2])
+        before = -evidence.gel_thickness - in_gel[:, 2]
+        behind = in_gel[:, 2] + evidence.gel_thickness + evidence.housing_depth + touch.way
+        np.maximum(deepest, np.minimum(np.minimum(beside.min(axis=1), before), behind), out=deepest)
     return deepest
-
-
-def depth_of_touches(evidence: ShapeEvidence, points: FloatArray) -> FloatArray:
-    """``(touches,)`` m that the deepest of ``(n, 3)`` points is in what each housing passed; 0 at least."""
-    deepest = [float(_depth_in_housing(evidence, touch, points).max()) for touch in evidence.distinct]
-    return np.asarray(np.maximum(deepest, 0.0))
-
-
-def _depth_in_housing(evidence: ShapeEvidence, touch: GuardedTouch, points: FloatArray) -> FloatArray:
-    """The housing and all the places it came through: one box, since its way is straight along its axis."""
-    in_gel = apply(inverse(touch.stand_from_gel), points)
-    beside = 0.5 * np.array(evidence.housing) - np.abs(in_gel[:, :2])
-    before = -evidence.gel_thickness - in_gel[:, 2]
-    behind = in_gel[:, 2] + evidence.gel_thickness + evidence.housing_depth + touch.way
-    return np.asarray(np.minimum(np.minimum(beside.min(axis=1), before), behind))
 
 
 @dataclass(frozen=True, eq=False)
