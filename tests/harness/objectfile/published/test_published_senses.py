@@ -4,6 +4,7 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,12 +12,7 @@ import pytest
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.published.answers import QuerySettings, answer_queries
-from harness.objectfile.published.entries import (
-    PublishedColoursEntry,
-    PublishedDepthEntry,
-    PublishedGainsEntry,
-    PublishedObject,
-)
+from harness.objectfile.published.entries import PublishedObject
 from harness.objectfile.published.look import CellNetworks, PublishedLook
 from harness.objectfile.published.sound import (
     compat_sounds,
@@ -33,28 +29,13 @@ from tests.samples.published_objects import committed_object, without_bounds
 
 
 @pytest.fixture(scope="module")
-def second() -> PublishedObject:
+def second() -> Any:
     return committed_object("kilo")
 
 
 @pytest.fixture(scope="module")
-def first(tmp_path_factory: pytest.TempPathFactory) -> PublishedObject:
+def first(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return without_bounds(tmp_path_factory.mktemp("published") / "old")
-
-
-def gains(of: PublishedObject) -> PublishedGainsEntry:
-    assert of.description.audio_gains is not None
-    return of.description.audio_gains
-
-
-def depths(of: PublishedObject) -> PublishedDepthEntry:
-    assert of.description.touch_depth is not None
-    return of.description.touch_depth
-
-
-def colours(of: PublishedObject) -> PublishedColoursEntry:
-    assert of.description.touch_colours is not None
-    return of.description.touch_colours
 
 
 POINT = np.array([[0.0, 0.02, 0.05]])
@@ -67,8 +48,8 @@ def test_a_mode_rings_as_it_is_written() -> None:
     assert found[1] == pytest.approx(-0.5 * found[0])
 
 
-def test_a_compatible_sound_knows_the_sign_of_a_force_and_not_its_size(second: PublishedObject) -> None:
-    entry, force = gains(second), np.array([0.2, -0.7, 1.0])
+def test_a_compatible_sound_knows_the_sign_of_a_force_and_not_its_size(second: Any) -> None:
+    entry, force = second.description.audio_gains, np.array([0.2, -0.7, 1.0])
     amplitudes = mode_gains(second, entry, POINT) @ force
     modes = np.array(entry.frequencies_hz), np.abs(entry.dampings_per_s)
     one, ten, back = (compat_sounds(scale * amplitudes, *modes)[0] for scale in (1.0, 10.0, -1.0))
@@ -92,9 +73,9 @@ def test_a_force_of_zero_and_a_silent_sound_are_refused_and_never_divided_by(
         peak_normalised(np.zeros((1, 5)))
 
 
-def test_a_strike_outside_of_the_trained_box_is_refused(second: PublishedObject) -> None:
+def test_a_strike_outside_of_the_trained_box_is_refused(second: Any) -> None:
     with pytest.raises(OutOfDomain, match="strike 0"):
-        mode_gains(second, gains(second), POINT + 1.0)
+        mode_gains(second, second.description.audio_gains, POINT + 1.0)
 
 
 @pytest.mark.parametrize(
@@ -106,22 +87,19 @@ def test_a_strike_outside_of_the_trained_box_is_refused(second: PublishedObject)
         ((0.0, 0.0, 0.4e-3), r"depth 0 at \(0.4\) mm"),
     ],
 )
-def test_a_press_that_was_not_trained_is_refused(
-    second: PublishedObject, press: tuple[float, ...], said: str
-) -> None:
+def test_a_press_that_was_not_trained_is_refused(second: Any, press: tuple[float, ...], said: str) -> None:
     with pytest.raises(OutOfDomain, match=said):
-        touch_maps(second, depths(second), POINT, np.array([press]))
+        touch_maps(second, second.description.touch_depth, POINT, np.array([press]))
 
 
-def test_presses_at_the_limits_are_allowed_and_an_azimuth_is_an_angle(second: PublishedObject) -> None:
+def test_presses_at_the_limits_are_allowed_and_an_azimuth_is_an_angle(second: Any) -> None:
     gel = np.array([[np.radians(15), 1.0, 2e-3], [np.radians(15), 1.0 + 2 * np.pi, 2e-3], [0.0, 0.0, 0.5e-3]])
-    maps = touch_maps(second, depths(second), np.repeat(POINT, 3, axis=0), gel)
+    maps = touch_maps(second, second.description.touch_depth, np.repeat(POINT, 3, axis=0), gel)
     assert np.isfinite(maps).all()
     assert maps[0] == pytest.approx(maps[1], rel=1e-3)
 
 
-def test_a_look_answers_a_point_alike_in_any_company(second: PublishedObject) -> None:
-    assert second.description.vision is not None
+def test_a_look_answers_a_point_alike_in_any_company(second: Any) -> None:
     field = PublishedLook.open(second, second.description.vision).coarse
     random = np.random.default_rng(0)
     points, views = random.uniform(-0.6, 0.6, (500, 3)), random.normal(size=(500, 3))
@@ -132,10 +110,8 @@ def test_a_look_answers_a_point_alike_in_any_company(second: PublishedObject) ->
     assert apart == pytest.approx(together, rel=1e-5, abs=1e-5)
 
 
-def test_a_thousandth_within_the_faces_of_its_cube_a_look_is_empty(second: PublishedObject) -> None:
+def test_a_thousandth_within_the_faces_of_its_cube_a_look_is_empty(second: Any) -> None:
     entry = second.description.vision
-    assert entry is not None
-    assert entry.cells is not None
     cells = CellNetworks.open(second, entry.cells, second.network(entry.network))
     field = replace(cells, networks=np.zeros_like(cells.networks), occupied=None).raw
     inward = np.array([0.0, 0.9e-3, 1.1e-3, 0.1])
@@ -147,25 +123,24 @@ def test_a_thousandth_within_the_faces_of_its_cube_a_look_is_empty(second: Publi
             assert found.any(axis=1).tolist() == [False, False, True, True]
 
 
-def test_a_sense_of_version_1_without_bounds_refuses_in_one_sentence(first: PublishedObject) -> None:
+def test_a_sense_of_version_1_without_bounds_refuses_in_one_sentence(first: Any) -> None:
     entry = first.description.audio_spectrum
-    assert entry is not None
     with pytest.raises(WrongUse, match="--audio-bounds LOW HIGH"):
         spectrum_sounds(first, entry, POINT, np.ones((1, 3)))
     with pytest.raises(WrongUse, match="--touch-bounds LOW HIGH"):
-        touch_images(first, colours(first), POINT)
+        touch_images(first, first.description.touch_colours, POINT)
 
 
-def test_with_the_querys_bounds_a_touch_depends_on_its_company_and_with_given_ones_not(
-    first: PublishedObject,
-) -> None:
+def test_with_the_querys_bounds_a_touch_depends_on_its_company_and_with_given_ones_not(first: Any) -> None:
     near, far = np.array([[0.01, 0.02, 0.03]]), np.array([[0.01, 0.02, 0.03], [0.05, 0.05, 0.12]])
-    alone, company = (touch_images(first, colours(first), each, of_query=True)[0] for each in (near, far))
+    known: Any = committed_object("first")
+    entry = first.description.touch_colours
+    alone, company = (touch_images(first, entry, each, of_query=True)[0] for each in (near, far))
     assert not np.array_equal(alone, company)
-    known = committed_object("first")
-    assert np.array_equal(*(touch_images(known, colours(known), each)[0] for each in (near, far)))
+    entry = known.description.touch_colours
+    assert np.array_equal(*(touch_images(known, entry, each)[0] for each in (near, far)))
     with pytest.raises(OutOfDomain, match="press 0"):
-        touch_images(known, colours(known), np.array([[0.0, 0.0, 0.2]]))
+        touch_images(known, entry, np.array([[0.0, 0.0, 0.2]]))
 
 
 def test_an_untouched_gel_is_seen_as_its_background(tmp_path: Path) -> None:
@@ -218,7 +193,7 @@ def _pack(folder: Path) -> Path:
     return folder
 
 
-def test_a_folder_of_either_kind_is_not_taken_for_the_other(second: PublishedObject, tmp_path: Path) -> None:
+def test_a_folder_of_either_kind_is_not_taken_for_the_other(second: Any, tmp_path: Path) -> None:
     with pytest.raises(WrongUse, match="object render queries"):
         ObjectFile.open(second.folder)
     with pytest.raises(WrongUse, match="ObjectFile"):
@@ -226,7 +201,7 @@ def test_a_folder_of_either_kind_is_not_taken_for_the_other(second: PublishedObj
 
 
 def test_everything_of_an_imported_folder_is_verified_and_damage_is_found(tmp_path: Path) -> None:
-    of = PublishedObject.open(shutil.copytree(committed_object("osf").folder, tmp_path / "mug"))
+    of: Any = PublishedObject.open(shutil.copytree(committed_object("osf").folder, tmp_path / "mug"))
     assert all(check.passed for check in verify(of))
     path = of.folder / "vision_fine.onnx"
     data = bytearray(path.read_bytes())
@@ -235,7 +210,7 @@ def test_everything_of_an_imported_folder_is_verified_and_damage_is_found(tmp_pa
     assert "vision_fine.onnx: bytes" in [check.name for check in verify(of) if not check.passed]
     (of.folder / "audio.onnx").unlink()
     with pytest.raises(DataRefused, match=r"audio\.onnx"):
-        mode_gains(of, gains(of), POINT)
+        mode_gains(of, of.description.audio_gains, POINT)
 
 
 @pytest.mark.parametrize(
@@ -248,7 +223,7 @@ def test_everything_of_an_imported_folder_is_verified_and_damage_is_found(tmp_pa
     ],
 )
 def test_a_description_of_another_kind_is_refused(
-    second: PublishedObject, change: dict[str, object], said: str, tmp_path: Path
+    second: Any, change: dict[str, object], said: str, tmp_path: Path
 ) -> None:
     tree = json.loads((second.folder / "object.json").read_text())
     (tmp_path / "object.json").write_text(json.dumps(tree | change))
