@@ -21,7 +21,7 @@ from harness.objectfile.verify.verify import verify
 from harness.sim.modal.file import modes_of_file
 from harness.sim.modal.modal import HEARING, default_edge, solved_once
 from harness.sim.modal.modes import Modes, dampings
-from harness.sim.modal.stage_seconds import CPU, Begin, cpu, renamed, timed, wall
+from harness.sim.modal.stage_seconds import CPU, Begin, cpu, timed, wall
 from harness.sim.solid.surface_source import surface_of
 from harness.sim.solid.volume_mesh import read_volume
 
@@ -151,7 +151,11 @@ def _modes(
         modes, kept = solved_once(taken.mesh, wanted.material, wanted.limit, edge, wanted.most, store, begin)
         mesh, said = taken.mesh, (*taken.said, *((_KEPT,) if kept else ()))
     none = dict.fromkeys([before + stage for before in ("", CPU) for stage in _SOLVED.values()], 0.0)
-    seconds |= whole | none | renamed(modes.seconds, _SOLVED)
+    seconds |= whole | none
+    for old, new in _SOLVED.items():
+        for before in ("", CPU):
+            if before + old in modes.seconds:
+                seconds[before + new] = modes.seconds[before + old]
     return mesh, modes, source, said
 
 

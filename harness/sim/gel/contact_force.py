@@ -21,7 +21,7 @@ import numpy as np
 from scipy.fft import irfft2, next_fast_len, rfft2
 from scipy.ndimage import find_objects, label
 
-from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray, block_means, read_only
+from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
 from harness.basics.errors import OutOfDomain
 from harness.sim.gel.elastic import GelElastic, disc_stiffness, influence
 
@@ -319,12 +319,8 @@ def contact_pressure(depth: FloatArray, pitch: float, thickness: float, gel: Gel
     pascals = np.zeros(depth.shape)
     if not depth.any():
         return Pressure(read_only(pascals), 0.0, 0)
-    rows, columns = (_span(np.asarray(depth.any(axis=axis))) for axis in (1, 0))
+    touched = (np.flatnonzero(depth.any(axis=axis)) for axis in (1, 0))
+    rows, columns = (slice(int(where[0]), int(where[-1]) + 1) for where in touched)
     found = _Search(depth[rows, columns], pitch, thickness, gel).run()
     pascals[rows, columns] = found.pascals
     return Pressure(read_only(pascals), found.left, found.turns)
-
-
-def _span(touched: AnyArray) -> slice:
-    where = np.flatnonzero(touched)
-    return slice(int(where[0]), int(where[-1]) + 1)

@@ -164,7 +164,9 @@ def gathered(seen: VisibleSurface, falling: FloatArray, clock: _Clock | None = N
         read_only(covered / every),
         read_only(np.where(covered > 0.0, depth, np.inf)),
     )
-    normal = read_only(_mean_direction(_summed(seen, seen.places.normals).sum(axis=0)))
+    total = _summed(seen, seen.places.normals).sum(axis=0)
+    length = np.linalg.norm(total, axis=-1, keepdims=True)
+    normal = read_only(np.asarray(total / np.where(length > 0.0, length, 1.0)))
     noise, alpha_noise = (
         _left_unknown(quarters[..., each], seen.samples) for each in (slice(3), slice(3, 4))
     )
@@ -186,11 +188,6 @@ def _left_unknown(quarters: FloatArray, samples: int) -> float | None:
         return None
     means = quarters / np.array(quarter_counts(samples))[:, None, None, None]
     return float(np.sqrt(np.mean(np.var(means, axis=0, ddof=1)) / 8.0))
-
-
-def _mean_direction(total: FloatArray) -> FloatArray:
-    length = np.linalg.norm(total, axis=-1, keepdims=True)
-    return np.asarray(total / np.where(length > 0.0, length, 1.0))
 
 
 def pixel_places(samples: int) -> list[tuple[Place, int]]:

@@ -163,14 +163,10 @@ def _bent(
         return np.inf
     sides = float(surface.face_areas.sum()) - 2.0 * volume / wall
     wave = min(bending_wave(material, wall, limit), 4.0 * volume / sides if sides > 0.0 else np.inf)
-    return float(max(_BENT_UP_TO * np.sqrt(wall * wave), _affordable_flat(surface, wall)))
-
-
-def _affordable_flat(surface: Mesh, wall: float) -> float:
-    """Metres of an edge with which filling flat walls makes about as many unknowns as they may have."""
-    middle = 0.5 * float(surface.face_areas.sum())
-    square = _FLAT_UNKNOWNS * middle / _FLAT_BUDGET
-    return float(max(square**0.5, (square * wall**0.5) ** 0.4))
+    # With this edge, filling flat walls makes about as many unknowns as they may have.
+    square = _FLAT_UNKNOWNS * 0.5 * float(surface.face_areas.sum()) / _FLAT_BUDGET
+    affordable = float(max(square**0.5, (square * wall**0.5) ** 0.4))
+    return float(max(_BENT_UP_TO * np.sqrt(wall * wave), affordable))
 
 
 def _affordable(volume: float, unknowns: float) -> float:

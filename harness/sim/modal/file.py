@@ -115,7 +115,7 @@ def modes_of_file(
     check_limit(HEARING if limit is None else limit, count)
     check_elasticity(Elasticity.uniform(material, 1), 1)
     seconds = dict.fromkeys(("intake", "mesh"), 0.0)
-    highest = _highest(limit, count)
+    highest = limit if limit is not None else HEARING if count is None else _UNLIMITED
     asked = _Asked(str(mesh), material, units, wall, highest, count, edge, envelope, up_axis)
     taken = _volume(asked, seconds)
     volume = taken is not None
@@ -135,12 +135,6 @@ def modes_of_file(
         seconds={**seconds, "assemble": spent["assembly"], "solve": spent["solve"]},
         said=taken.said,
     )
-
-
-def _highest(limit: float | None, count: int | None) -> float:
-    if limit is not None:
-        return limit
-    return HEARING if count is None else _UNLIMITED
 
 
 def _volume(asked: _Asked, seconds: dict[str, float]) -> _Taken | None:

@@ -24,17 +24,6 @@ def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     seconds[CPU + stage] = seconds.get(CPU + stage, 0.0) + time.process_time() - worked
 
 
-def renamed(seconds: Mapping[str, float], names: Mapping[str, str]) -> dict[str, float]:
-    """The seconds of some stages under other names; stages that were not there are left out.
-
-    Args:
-        seconds: as ``timed`` fills them.
-        names: of stages, by their old names.
-    """
-    pairs = [(before + old, before + new) for before in ("", CPU) for old, new in names.items()]
-    return {new: seconds[old] for old, new in pairs if old in seconds}
-
-
 def wall(seconds: Mapping[str, float]) -> dict[str, float]:
     """On the clock, by stage."""
     return {stage: took for stage, took in seconds.items() if not stage.startswith(CPU)}

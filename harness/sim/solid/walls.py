@@ -47,7 +47,8 @@ def walled(mesh: Mesh, wall: float | None) -> Mesh:
     # Level sets have float32 coordinates: far from the origin they lose the wall.
     centre = mesh.vertices[0]
     cavity = _cavity(Mesh(mesh.vertices - centre, mesh.faces), wall)
-    return _joined(mesh, Mesh(cavity.vertices + centre, cavity.faces))
+    vertices = np.concatenate([mesh.vertices, cavity.vertices + centre])
+    return Mesh(vertices, np.concatenate([mesh.faces, cavity.faces + len(mesh.vertices)]))
 
 
 def _cavity(mesh: Mesh, wall: float) -> Mesh:
@@ -114,8 +115,3 @@ class _Sampled:
         along = (at - self.origin[axis]) / self.cell
         index = min(max(int(along), 0), self.last[axis])
         return index, min(max(along - index, 0.0), 1.0)
-
-
-def _joined(outside: Mesh, cavity: Mesh) -> Mesh:
-    vertices = np.concatenate([outside.vertices, cavity.vertices])
-    return Mesh(vertices, np.concatenate([outside.faces, cavity.faces + len(outside.vertices)]))

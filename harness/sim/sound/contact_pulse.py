@@ -176,7 +176,9 @@ def struck(
         sound += _heavy(
             frequencies[heavy], dampings[heavy], amplitudes[:, heavy], pulse, rate, sound.shape[1]
         )
-    error = _worst(free, sound)
+    # What rings on is in error as it says, and the quadratures by what they miss.
+    peaks = loudest(sound)
+    error = decibels(loudest(free.sound) * 10.0 ** (free.error / 20.0) + _MISSED * peaks, peaks)
     return Synthesis(read_only(sound), rate, read_only(~heard), error, time.perf_counter() - begun)
 
 
@@ -235,9 +237,3 @@ def _quadrature(pulse: HertzPulse, rate: float, count: int) -> tuple[FloatArray,
     lengths = np.append(np.diff(begins), pulse.duration - begins[-1])[:, None]
     times = begins[:, None] + 0.5 * lengths * (nodes + 1.0)
     return times, 0.5 * lengths * weights * pulse.force(times)
-
-
-def _worst(free: Synthesis, sound: FloatArray) -> float:
-    """dB: what rings on is in error as it says, and the quadratures by what they miss."""
-    peaks = loudest(sound)
-    return decibels(loudest(free.sound) * 10.0 ** (free.error / 20.0) + _MISSED * peaks, peaks)

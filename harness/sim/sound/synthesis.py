@@ -94,7 +94,10 @@ def synthesize(
         if direct.any():
             sound += _summed(f[direct], d[direct], parts[:, direct], samples, rate)
     peaks = loudest(sound)
-    errors += _phase_errors(f, d, parts, samples / rate) + _rounding(parts, peaks, samples, level)
+    # A phase is known to four roundings of its turns, at the time when that tells most.
+    lasting = np.minimum(samples / rate, 1.0 / (np.e * np.maximum(d, 1e-300)))
+    phase_errors = np.abs(parts) @ (4.0 * np.finfo(np.float64).eps * np.pi * f * lasting)
+    errors += phase_errors + _rounding(parts, peaks, samples, level)
     return Synthesis(
         read_only(sound), rate, read_only(~heard), decibels(errors, peaks), time.perf_counter() - begun
     )
@@ -159,15 +162,6 @@ def faded_after(frequencies: FloatArray, dampings: FloatArray, rate: float) -> i
     over = np.sqrt(np.maximum((dampings - omega) * (dampings + omega), 0.0))
     slow = np.where(dampings > omega, omega**2 / np.maximum(dampings + over, omega), dampings)
     return int(min(np.ceil(_FADED * rate / max(float(slow.min()), 1e-12)), 2.0**53))
-
-
-def _phase_errors(
-    frequencies: FloatArray, dampings: FloatArray, amplitudes: AnyArray, duration: float
-) -> FloatArray:
-    """``(k,)``: a phase known to four roundings of its turns, at the time when that tells most."""
-    lasting = np.minimum(duration, 1.0 / (np.e * np.maximum(dampings, 1e-300)))
-    off = 4.0 * np.finfo(np.float64).eps * np.pi * frequencies * lasting
-    return np.asarray(np.abs(amplitudes) @ off)
 
 
 def _rounding(amplitudes: AnyArray, peaks: FloatArray, samples: int, level: SynthesisLevel) -> FloatArray:

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from scipy.linalg.blas import dgemm, sgemm
 
-from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.sim.sound.synthesis_kernels import MEMORY, TILE, block_counts, fill, largest_rest
 from harness.sim.sound.synthesis_spectrum import add_modes, may_be_added
 
@@ -94,7 +94,10 @@ def fill_sound(steps: Steps, weights: AnyArray, sound: FloatArray, level: TableL
     blocks, length = sound.shape
     seconds = length / steps.rate
     counts = _counts(sizes, steps.dampings, seconds, blocks, level)
-    lasting = _lasting(steps, counts, blocks, length, level)
+    # Modes that hardly die away are summed by their spectrum, if they are many.
+    lasting = may_be_added(steps.dampings, blocks * length, steps.rate) & (counts > 0)
+    if level != "fast" or blocks * length < _SHORTEST or counts[lasting].sum() < _LASTING * blocks:
+        lasting = np.zeros_like(lasting)
     counts[lasting], sizes[lasting] = 0, 0.0
     rest = largest_rest(sizes, steps.dampings, counts, seconds, blocks, _MULTIPLE)
     missed = loudest * (rest + 4.0 * len(sizes) * _FLOORS[level])
@@ -122,13 +125,6 @@ def _counts(
             return counts
         # Counts are whole multiples, so that a little less may change none.
         quiet *= min(most / rest, 0.8)
-
-
-def _lasting(steps: Steps, counts: IntArray, blocks: int, length: int, level: TableLevel) -> BoolArray:
-    """``(m,)``: modes that are summed by their spectrum: those that hardly die away, if they are many."""
-    slow = may_be_added(steps.dampings, blocks * length, steps.rate) & (counts > 0)
-    enough = level == "fast" and blocks * length >= _SHORTEST and counts[slow].sum() >= _LASTING * blocks
-    return np.asarray(slow & enough)
 
 
 @dataclass(frozen=True, eq=False)
