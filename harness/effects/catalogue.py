@@ -10,7 +10,7 @@ touch and pictures from an ObjectFile those of ``harness.effects.touch_file_effe
 ``harness.effects.camera_effects``.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -101,15 +101,6 @@ def _image(given: Given, _levels: Levels) -> ByteArray:
     return np.clip(np.rint(seen), 0.0, 255.0).astype(np.uint8)
 
 
-def _later(name: str) -> Callable[[Given, Levels], Any]:
-    """An effect that is declared, so that plans can say why it is not needed, and not built."""
-
-    def compute(_given: Given, _levels: Levels) -> Any:
-        raise NotImplementedError(f"{name} is declared and not built yet; do not ask for it")
-
-    return compute
-
-
 TOUCH = Condition(lambda f: f.scene.sensors.touch, "sensors.touch is true", "sensors.touch is false")
 SHADOW = Condition(
     lambda f: f.sensor.casts_shadow, "the sensor's light casts shadows", "the sensor casts no shadows"
@@ -173,5 +164,4 @@ EFFECTS = (
     Effect("touch.image", ("touch.noise",), _image, when=TOUCH),
     *SOUND_EFFECTS,
     *scene_camera_effects(CAMERA, LIGHTS),
-    Effect("arm.dynamics", ("arm.joints", "arm.model"), _later("arm.dynamics")),
 )

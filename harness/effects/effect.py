@@ -11,9 +11,6 @@ from harness.effects.accuracy import Accuracy, Knob, Level
 Compute = Callable[[Mapping[str, Any], Mapping[str, Level]], Any]
 """From the needed quantities by name, and the levels of the effect's knobs by name."""
 
-Omission = Callable[[Mapping[str, Any]], float]
-"""From the sources: how much leaving the effect out would change the result, relative."""
-
 
 @dataclass(frozen=True)
 class Facts:
@@ -58,8 +55,6 @@ class Effect:
     knobs: tuple[Knob[Level], ...] = ()  #: that its levels are chosen by.
     version: int = 1  #: raised with every change of what it computes, so that stored results are dropped.
     stored: bool = False  #: whether a result is worth keeping on disk.
-    omission: Omission | None = None
-    """an estimate of what leaving it out would change, where there is a cheap one."""
     choice: Knob[Level] | None = None  #: of ways to compute it; None where there is one.
     ways: Mapping[Level, Implementation] = field(default_factory=dict, hash=False)
     """by the levels of ``choice``; the effect's own is for the levels not named here."""
@@ -80,7 +75,6 @@ class Effect:
             knobs=way.knobs,
             version=way.version,
             stored=way.stored,
-            omission=None,
         )
 
 

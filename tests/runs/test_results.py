@@ -47,7 +47,6 @@ NOT_CALLED_FOR = (
     "camera.seen",
     "camera.shadow",
     "camera.image",
-    "arm.dynamics",
 )
 
 

@@ -90,7 +90,7 @@ def test_a_touch_scene_computes_no_sound_room_light_or_dynamics() -> None:
     assert skipped["room.reverberation"] == "the scene has no [room]"
     assert skipped["camera.image"] == "sensors.camera is false"
     assert skipped["camera.shadow"] == "the scene has no [[lights]]"
-    assert skipped["arm.dynamics"] == "nothing asked for arm.dynamics"
+    assert skipped["touch.force"] == "nothing asked for touch.force"
     assert len(explained["ran"]) + len(explained["skipped"]) == len(EFFECTS)
 
 
@@ -231,12 +231,6 @@ def test_lights_call_for_shadows_of_the_scene_camera() -> None:
     assert [step.effect.provides for step in scene_plan(lit, GELSIGHT_R15).ran] == drawn
 
 
-def test_what_is_not_built_says_so_by_name() -> None:
-    made = plan(EFFECTS, Facts(SCENE, GELSIGHT_R15), ["arm.dynamics"], default_accuracy(EFFECTS))
-    with pytest.raises(NotImplementedError, match=r"arm\.dynamics"):
-        evaluate(made, {"arm.joints": None, "arm.model": None})
-
-
 def test_without_touch_a_tactile_image_is_refused() -> None:
     with pytest.raises(WrongUse, match=r"touch\.image .*sensors\.touch is false"):
         scene_plan(with_sensors(touch=False), GELSIGHT_R15)
@@ -261,4 +255,4 @@ def test_what_runs_has_a_row_and_each_reason_not_to_run_a_sentence() -> None:
     assert sorted(named) == sorted(skipped.effect.provides for skipped in made.skipped)
     assert len(sentences) < len(named)
     assert "touch.shadow" in sentences["the sensor casts no shadows"]
-    assert "arm.dynamics" in sentences["nothing asked for it"]
+    assert "touch.force" in sentences["nothing asked for it"]
