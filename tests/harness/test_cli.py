@@ -102,7 +102,7 @@ def test_wrong_use_exits_with_2() -> None:
 def test_a_mistyped_word_is_told_in_the_programs_own_words(capsys: pytest.CaptureFixture[str]) -> None:
     assert invoke(["run", "contact-localisation"]) == 2
     said = capsys.readouterr().err
-    assert "no experiment 'contact-localisation'; did you mean 'contact-localization'?" in said
+    assert "'contact-localisation'; did you mean 'contact-localization'?" in said
     assert "Value error" not in said
 
 

@@ -186,8 +186,7 @@ def test_an_object_that_is_not_there(resume: Resume, begun: Recording) -> None:
 
     session = resume(edited(begun, take_away), lambda bench: None, away)
     assert session.code == 1
-    assert session.said["error"].startswith("contact 3: the gel travelled ")
-    assert "met nothing" in session.said["error"]
+    assert session.said["error"].startswith("contact 3: ")
     assert "[object.pose]" in session.said["error"]
     assert session.failed["moved"] < 1e-3
     assert session.failed["away"] < 1e-3, "it is back at the stand-off"

@@ -70,7 +70,7 @@ def test_a_protective_stop_is_seen_latched_and_never_resumed(patient_arm: UrArm,
     far_end.cue("protective_stop")
     error = motion.join()
     assert isinstance(error, ProtectiveStop)
-    assert "during the joint motion: protective stop; flange at (" in str(error)
+    assert "joint motion" in str(error)
     assert arm.state().safety == "protective stop"
     assert comes_to_rest(far_end, 1.0, FAR)
     with pytest.raises(ProtectiveStop):
@@ -78,7 +78,7 @@ def test_a_protective_stop_is_seen_latched_and_never_resumed(patient_arm: UrArm,
     with pytest.raises(ProtectiveStop):
         arm.zero_force()
     arm.close()
-    with pytest.raises(ProtectiveStop, match="release the stop"):
+    with pytest.raises(ProtectiveStop, match=far_end.address):
         arm.open()
 
 
@@ -110,9 +110,9 @@ def test_a_protective_stop_at_rest_is_latched_too(patient_arm: UrArm, far_end: F
     while arm.state().safety == "normal":
         time.sleep(0.01)
     time.sleep(0.1)
-    with pytest.raises(ProtectiveStop, match="at rest"):
+    with pytest.raises(ProtectiveStop):
         arm.move_joints(FAR, 0.1, 1.0)
-    with pytest.raises(ProtectiveStop, match="at rest"):
+    with pytest.raises(ProtectiveStop):
         arm.set_digital_output(1, True)
     assert far_end.outputs() == before | 1 << 16
     arm.set_digital_output(0, False)
@@ -125,7 +125,7 @@ def test_killing_the_child_in_flight_stops_the_arm(arm: UrArm, far_end: FarEnd) 
     os.kill(pid, signal.SIGKILL)
     error = motion.join()
     assert isinstance(error, BenchFault)
-    assert "open it again" in str(error)
+    assert far_end.address in str(error)
     assert comes_to_rest(far_end, 1.0, FAR)
     assert gone(pid)
     arm.close()
@@ -155,7 +155,7 @@ def test_a_stop_while_the_child_is_frozen_goes_through_the_dashboard(arm: UrArm,
     assert comes_to_rest(far_end, 0.5, FAR)
     os.kill(pid, signal.SIGKILL)
     assert isinstance(motion.join(), BenchFault)
-    with pytest.raises(BenchFault, match="open it again"):
+    with pytest.raises(BenchFault, match=far_end.address):
         arm.move_joints(READY, 0.1, 1.0)
 
 
@@ -199,7 +199,7 @@ def test_a_frozen_stream_in_flight_is_a_fault(arm: UrArm, far_end: FarEnd) -> No
     far_end.cue("freeze", 3.0)
     error = motion.join()
     assert isinstance(error, BenchFault)
-    assert "network cable" in str(error)
+    assert "cable" in str(error)
 
 
 def test_beyond_the_hard_limit_the_arm_stays_stopped(far_end: FarEnd, tmp_path: Path) -> None:
@@ -208,9 +208,9 @@ def test_beyond_the_hard_limit_the_arm_stays_stopped(far_end: FarEnd, tmp_path: 
     here = arm.state().base_from_flange
     arm.move_line(translation(np.array([0, 0, FLOOR + 0.005 - here[2, 3]])) @ here, 0.2, 1.2)
     arm.zero_force()
-    with pytest.raises(SafetyStop, match="N; the limit is"):
+    with pytest.raises(SafetyStop, match=r" N.*\b5 N"):
         arm.move_line(translation(0.02 * DOWN) @ arm.state().base_from_flange, 0.2, 1.5)
-    with pytest.raises(SafetyStop, match="opened again"):
+    with pytest.raises(SafetyStop, match=r" N.*\b5 N"):
         arm.move_line(translation(-0.01 * DOWN) @ arm.state().base_from_flange, 0.05, 1.0)
     arm.close()
 
@@ -225,11 +225,10 @@ def test_a_program_ended_at_the_pendant_is_named_latches_and_is_not_taken_up_aga
     error = motion.join()
     assert isinstance(error, BenchFault)
     assert f"program {done}" in str(error)
-    assert f"somebody {done} the program, at the pendant" in str(error)
     assert comes_to_rest(far_end, 1.0, FAR)
     assert far_end.ask("play") == "Failed to execute: play"
     resting = far_end.joints()
-    with pytest.raises(BenchFault, match=f"somebody {done} the program"):
+    with pytest.raises(BenchFault, match=done):
         arm.move_joints(READY, 0.2, 1.5)
     assert np.array_equal(far_end.joints(), resting)
 
@@ -241,7 +240,7 @@ def test_a_program_ended_at_the_pendant_at_rest_latches_too(
     far_end.ask(command)
     time.sleep(0.3)
     assert far_end.ask("play") == "Failed to execute: play"
-    with pytest.raises(BenchFault, match=f"somebody {done} the program"):
+    with pytest.raises(BenchFault, match=done):
         arm.move_joints(FAR, 0.1, 1.0)
 
 
@@ -269,11 +268,11 @@ def test_a_delay_in_flight_fails_the_motion_and_latches(arm: UrArm, far_end: Far
     freeze(child_pid(arm), 0.25)
     error = motion.join()
     assert isinstance(error, BenchFault)
-    assert "this computer was too busy: the watchdog waited for" in str(error)
+    assert "watchdog" in str(error)
     assert comes_to_rest(far_end, 1.0, FAR)
     time.sleep(0.6)
     resting = far_end.joints()
-    with pytest.raises(BenchFault, match="open the arm again"):
+    with pytest.raises(BenchFault, match=r"watchdog.* ms"):
         arm.move_joints(READY, 0.2, 1.5)
     assert np.array_equal(far_end.joints(), resting)
     arm.close()
@@ -313,6 +312,6 @@ def test_a_frozen_program_stops_its_motion_and_may_not_move_again(far_end: FarEn
         first, second = (line.decode() for line in running.stdout)
     assert stopped, "while the program was frozen"
     assert "BenchFault" in first
-    assert "was frozen or this computer too busy" in first
+    assert " ms" in first
     assert second == first
     assert np.array_equal(far_end.joints(), resting)

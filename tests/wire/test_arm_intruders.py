@@ -89,13 +89,12 @@ def test_another_program_in_mid_motion_is_stopped_within_40_mm_and_latches(
     far_end.program(PROGRAMS[program])
     error = line.join()
     assert isinstance(error, SafetyStop)
-    assert "by somebody else" in str(error)
-    assert "during the straight line" in str(error)
+    assert "straight line" in str(error)
     assert comes_to_rest(far_end, 1.0)
     time.sleep(0.1)
     assert way_after_the_line(arm) < LONGEST
     resting = far_end.joints()
-    with pytest.raises(SafetyStop, match="by somebody else"):
+    with pytest.raises(SafetyStop, match=r"straight line.*program"):
         arm.move_joints(READY, 0.2, 1.0)
     assert np.array_equal(far_end.joints(), resting)
 
@@ -107,7 +106,7 @@ def test_another_program_at_rest_is_stopped_and_latches_and_opening_again_mends_
     while "true" in far_end.ask("running"):
         time.sleep(0.005)
     assert comes_to_rest(far_end, 1.0)
-    with pytest.raises(SafetyStop, match="at rest: a program 'intruder' was started"):
+    with pytest.raises(SafetyStop, match="'intruder'"):
         arm.move_joints(READY + 0.02, 0.2, 1.0)
     arm.close()
     arm.open()

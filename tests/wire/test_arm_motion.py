@@ -103,7 +103,7 @@ def test_a_stop_from_another_thread_ends_a_motion_within_150_ms(arm: UrArm) -> N
     target = READY + np.array([0.5, 0, 0, 0, 0, 0])
     stopper = threading.Thread(target=stop_in_flight)
     stopper.start()
-    with pytest.raises(SafetyStop, match="stopped by request"):
+    with pytest.raises(SafetyStop, match=r"joint motion.*request"):
         arm.move_joints(target, 0.3, 1.5)
     stopper.join()
     assert stopped[0] < 0.15
@@ -153,14 +153,14 @@ def test_zero_force_takes_the_sensors_bias_away(arm: UrArm) -> None:
 def test_zero_force_is_refused_in_contact(arm: UrArm) -> None:
     lower_to(arm, 0.005)
     assert arm.move_until_contact(DOWN, 0.01, 3.0, 0.02)
-    with pytest.raises(SafetyStop, match="retreat first"):
+    with pytest.raises(SafetyStop, match=r" mm .* mm"):
         arm.zero_force()
 
 
 def test_pressing_beyond_the_limit_stops_the_arm_and_lets_it_retreat(arm: UrArm) -> None:
     lower_to(arm, 0.005)
     assert arm.move_until_contact(DOWN, 0.01, 3.0, 0.02)
-    with pytest.raises(SafetyStop, match=r"the limit is 10\.0 N"):
+    with pytest.raises(SafetyStop, match=r"\b10\.0 N"):
         arm.move_line(above(arm, -0.003), 0.01, 0.5)
     assert 9.0 < np.linalg.norm(arm.state().wrench[:3]) < 14.0
     arm.move_line(above(arm, 0.02), 0.05, 0.5)
@@ -221,6 +221,6 @@ def test_one_motion_at_a_time(arm: UrArm) -> None:
     mover.start()
     while not arm.state().moving:
         time.sleep(0.005)
-    with pytest.raises(BenchFault, match="during a motion"):
+    with pytest.raises(BenchFault, match="motion"):
         arm.move_joints(READY, 0.5, 2.0)
     mover.join()

@@ -32,7 +32,7 @@ def test_a_relay_to_what_is_no_mock_is_refused_and_only_its_name_is_asked(
 ) -> None:
     before = real.joints()
     with Relay(real.address) as relay:
-        with pytest.raises(SafetyStop, match=rf"serial number is '{REAL_SERIAL}'.*real arm"):
+        with pytest.raises(SafetyStop, match=f"'{REAL_SERIAL}'"):
             make_arm(relay.address, tmp_path).open()
         assert {port: data for port, data in relay.sent.items() if data} == {29999: b"get serial number\n"}
     assert real.ask("running") == "Program running: true"

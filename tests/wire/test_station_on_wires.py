@@ -36,5 +36,5 @@ def test_a_mocked_bench_opens_reads_and_leaves_nothing_behind(tmp_path: Path) ->
         os.kill(process_id, 0)
     with socket.socket() as probe:
         assert probe.connect_ex((address, 8080)) != 0
-    with pytest.raises(BenchFault, match="not running"):
+    with pytest.raises(BenchFault, match="station"):
         bench.mark(0, 1)

@@ -124,8 +124,8 @@ def test_an_address_that_others_can_reach_is_not_served(host: str) -> None:
     command = [sys.executable, "-m", "tests.support.ur_controller", "--host", host]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     assert done.returncode != 0
-    assert f"asked to serve on '{host}'" in done.stderr
-    assert "loopback addresses" in done.stderr
+    assert f"'{host}'" in done.stderr
+    assert "loopback" in done.stderr
 
 
 @pytest.mark.parametrize("frequency", [0.0, -1.0, 501.0, float("nan")])

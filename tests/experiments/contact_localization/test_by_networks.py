@@ -102,7 +102,7 @@ def test_a_pose_that_no_network_answers_is_drawn_and_said(run: RunFiles, drawn: 
     comparison = compare(scored, {"contact.gel_from_object": beside})
     assert drawn
     (note,) = comparison.notes
-    assert note.startswith("the readings are drawn with touch.shapes = reference: ")
+    assert "touch.shapes = reference" in note
 
 
 def test_a_damaged_network_in_a_run_is_refused(run: RunFiles) -> None:
@@ -110,7 +110,7 @@ def test_a_damaged_network_in_a_run_is_refused(run: RunFiles) -> None:
     data = path.read_bytes()
     path.write_bytes(data[:-1] + bytes([data[-1] ^ 1]))
     try:
-        with pytest.raises(DataRefused, match=r"touch\.onnx was changed"):
+        with pytest.raises(DataRefused, match=r"touch\.onnx\b.*sha256"):
             answered(replace(run))
     finally:
         path.write_bytes(data)

@@ -161,7 +161,7 @@ def test_a_card_that_does_not_say_when_it_sampled_is_not_used_for_phases() -> No
         strike_from_readings(struck(Card(uncertainty=u)), CALIBRATION) for u in (0.9 * UNSURE, 1.1 * UNSURE)
     )
     assert sure.fault == ""
-    assert "known to 110 us and at most 100 us" in unsure.fault
+    assert "110 us" in unsure.fault
     assert unsure.overload
 
 
@@ -178,7 +178,7 @@ def test_a_failed_hammer_is_the_failure() -> None:
 def test_flags_without_a_clock_are_refused() -> None:
     readings = struck(Card())
     del readings[CARD_CLOCK]
-    with pytest.raises(DataRefused, match=r"has microphone\.flags, and no microphone\.clock"):
+    with pytest.raises(DataRefused, match=r"microphone\.flags.*microphone\.clock"):
         strike_from_readings(readings, CALIBRATION)
 
 
@@ -193,10 +193,8 @@ def test_only_strikes_heard_by_one_stream_are_compared() -> None:
     )
     assert found[1] is None
     faults = [strike.fault for strike in found if strike is not None]
-    assert (
-        faults
-        == ["", "", "the microphone was opened anew in between: its latency may be another"] + ["lost"] * 2
-    )
+    assert [faults[0], faults[1], *faults[3:]] == ["", "", "lost", "lost"]
+    assert "latency" in faults[2]
     assert [strike.overload for strike in found if strike is not None] == [False, False, True, True, True]
 
 

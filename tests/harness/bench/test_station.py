@@ -118,7 +118,7 @@ def test_the_hammer_s_threshold_is_in_counts_of_its_calibration(instruments: typ
 
 def test_a_scene_with_sound_needs_a_hammer(tmp_path: Path) -> None:
     deaf = load_station(station_path("mock")).model_copy(update={"hammer": None, "microphone": None})
-    with pytest.raises(WrongUse, match=r"asks for sound, and the station 'mocked bench' has no \[hammer\]"):
+    with pytest.raises(WrongUse, match=r"'mocked bench'.*\[hammer\]"):
         station_module.make_hammer(deaf)
 
 
@@ -173,10 +173,10 @@ def test_every_failure_is_reported_and_what_was_opened_is_closed(
         "arm open": BenchFault("no controller at 1.2.3.4; check the network cable"),
         "camera open": BenchFault("no stream; check its cable"),
     }
-    with pytest.raises(BenchFault, match="2 instruments did not open") as caught, opened(tmp_path):
+    with pytest.raises(BenchFault, match="2 instruments") as caught, opened(tmp_path):
         pytest.fail("the bench was opened")
-    assert "arm: no controller at 1.2.3.4; check the network cable" in str(caught.value)
-    assert "camera: no stream; check its cable" in str(caught.value)
+    assert "arm: no controller at 1.2.3.4" in str(caught.value)
+    assert "camera: no stream" in str(caught.value)
     assert instruments.log == ["arm open", "gel open", "camera open", "gel close"]
 
 
@@ -227,56 +227,56 @@ def changed(old: str, new: str, folder: Path, name: str = "mock") -> Station:
 @pytest.mark.parametrize(
     ("name", "old", "new", "said"),
     [
-        ("mock", 'rate = "500 Hz"', 'adress = "1.2.3.4"', "unknown key 'arm.adress'.*did you mean 'address'"),
+        ("mock", 'rate = "500 Hz"', 'adress = "1.2.3.4"', "'arm.adress'.*'address'"),
         ("mock", 'kind = "ur"', 'kind = "urr"', "'arm.kind' = 'urr'"),
-        ("mock", 'model = "ur5e"', 'model = "ur5"', "did you mean 'ur5e'"),
-        ("mock", 'near = "10 mm"', "near = 10", "10 has no unit"),
-        ("mock", 'force_press = "10 N"', 'force_press = "10 kg"', "'10 kg' is not a force"),
-        ("mock", '"0.02 m"]', '"2 m"]', "workspace_low must lie below"),
-        ("mock", 'rate = "500 Hz"', 'address = "127.0.0.1"', "a mocked bench takes an address of its own"),
-        ("mock", "[mock]\ngap", "# gap", "'arm.address' is missing; only a station with"),
-        ("example_bench", 'url = "http://gsr', '# url = "', "'gel.url' is missing"),
-        ("example_bench", 'serial = "5D3F21A0"', "# serial", "'hammer.port' is missing"),
-        ("mock", "striker_output", "striker_outputs", "did you mean 'striker_output'"),
-        ("mock", "striker_output = 0 ", "# ", "'arm.striker_output' is missing; hammer.strike = 'arm'"),
+        ("mock", 'model = "ur5e"', 'model = "ur5"', "'ur5'.*'ur5e'"),
+        ("mock", 'near = "10 mm"', "near = 10", " 10 .*unit"),
+        ("mock", 'force_press = "10 N"', 'force_press = "10 kg"', "'10 kg'.*force"),
+        ("mock", '"0.02 m"]', '"2 m"]', "workspace_low"),
+        ("mock", 'rate = "500 Hz"', 'address = "127.0.0.1"', "mocked bench"),
+        ("mock", "[mock]\ngap", "# gap", "'arm.address'"),
+        ("example_bench", 'url = "http://gsr', '# url = "', "'gel.url'"),
+        ("example_bench", 'serial = "5D3F21A0"', "# serial", "'hammer.port'"),
+        ("mock", "striker_output", "striker_outputs", "'arm.striker_outputs'.*'striker_output'"),
+        ("mock", "striker_output = 0 ", "# ", "'arm.striker_output'.*hammer.strike = 'arm'"),
         ("mock", "striker_output = 0", "striker_output = 2", "'arm.striker_output' = 2"),
-        ("mock", 'stand_off = "6 mm"', 'standoff = "6 mm"', "did you mean 'stand_off'"),
-        ("mock", 'strike = "arm"', 'strike = "operator"', "nobody is at a mocked bench"),
-        ("mock", 'model = "DI-2108"', 'model = "2108"', "did you mean 'DI-2108'"),
+        ("mock", 'stand_off = "6 mm"', 'standoff = "6 mm"', "'hammer.standoff'.*'stand_off'"),
+        ("mock", 'strike = "arm"', 'strike = "operator"', "mocked bench"),
+        ("mock", 'model = "DI-2108"', 'model = "2108"', "'2108'.*'DI-2108'"),
         (
             "mock",
             'serial = "mock-2108"',
             'port = "/dev/ttyACM0"',
-            "a mocked bench takes an address of its own",
+            "mocked bench",
         ),
-        ("mock", "[microphone]", "[microphon]", "did you mean 'microphone'"),
-        ("mock", 'kind = "dataq"\nserial = "mock-378B02"', 'kind = "portaudio"', "'rate' is missing"),
+        ("mock", "[microphone]", "[microphon]", "'microphon'.*'microphone'"),
+        ("mock", 'kind = "dataq"\nserial = "mock-378B02"', 'kind = "portaudio"', "'rate'"),
         (
             "mock",
             'kind = "dataq"\nserial = "mock-378B02"',
             'kind = "portaudio"\nrate = "44.0995 kHz"',
-            "takes whole numbers of Hz",
+            "Hz",
         ),
         (
             "mock",
             'kind = "dataq"\nserial = "mock-378B02"',
             'kind = "portaudio"\nrate = "48 kHz"\ndevice = "hw:0"',
-            "a mocked bench takes an address of its own",
+            "mocked bench",
         ),
         (
             "mock",
             'kind = "dataq"\nserial = "mock-378B02"',
             'kind = "portaudio"\nrate = "48 kHz"\nchannels = 2\nchannel = 2',
-            "'channel' is 2, counted from 0, and the device has 2",
+            "'channel' .*2.* 2",
         ),
         (
             "example_bench",
             'kind = "dataq"\nserial = "378B02-1234"',
             'kind = "portaudio"\nrate = "48 kHz"',
-            "'microphone.device' is missing",
+            "'microphone.device'",
         ),
-        ("mock", 'serial = "mock-378B02"', 'device = "hw:0"', "'device' belongs to kind = 'portaudio'"),
-        ("mock", "[frames.flange_from_hammer]", "[frames.flange_from_hamer]", "mean 'flange_from_hammer'"),
+        ("mock", 'serial = "mock-378B02"', 'device = "hw:0"', "'device' .*kind = 'portaudio'"),
+        ("mock", "[frames.flange_from_hammer]", "[frames.flange_from_hamer]", "'flange_from_hammer'"),
     ],
 )
 def test_a_mistake_in_a_station_is_named(tmp_path: Path, name: str, old: str, new: str, said: str) -> None:
@@ -287,10 +287,10 @@ def test_a_mistake_in_a_station_is_named(tmp_path: Path, name: str, old: str, ne
 @pytest.mark.parametrize(
     ("left_out", "said"),
     [
-        (("hammer", "microphone"), r"'frames.flange_from_hammer' without a \[hammer\]"),
-        (("hammer", "flange_from_hammer"), r"a \[microphone\] without a \[hammer\]"),
-        (("microphone",), r"\[microphone\] is missing"),
-        (("flange_from_hammer",), "'frames.flange_from_hammer' is missing"),
+        (("hammer", "microphone"), r"'frames.flange_from_hammer' .*\[hammer\]"),
+        (("hammer", "flange_from_hammer"), r"\[microphone\] .*\[hammer\]"),
+        (("microphone",), r"\[microphone\]"),
+        (("flange_from_hammer",), "'frames.flange_from_hammer'"),
     ],
 )
 def test_a_hammer_is_whole_or_not_there(left_out: tuple[str, ...], said: str) -> None:
@@ -332,9 +332,9 @@ def test_markers_and_shadow_are_the_sensor_s(tmp_path: Path) -> None:
 def test_stations_are_found_by_name_or_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert station_path("mock").name == "mock.toml"
-    with pytest.raises(WrongUse, match="did you mean 'mock'"):
+    with pytest.raises(WrongUse, match=r"mok.*'mock'"):
         station_path("mok")
-    with pytest.raises(WrongUse, match=r"no station file 'a/b\.toml'"):
+    with pytest.raises(WrongUse, match=r"'a/b\.toml'"):
         station_path("a/b.toml")
     (tmp_path / "stations").mkdir()
     (tmp_path / "stations" / "mine.toml").write_text("", encoding="utf-8")
@@ -371,13 +371,11 @@ def test_a_microphone_on_a_sound_card_is_made_as_the_station_says() -> None:
 
 
 def test_a_calibration_of_a_microphone_on_another_converter_is_refused() -> None:
-    with pytest.raises(
-        CalibrationRefused, match=r"full scale 8388607, the station's \[microphone\] has 2147483647"
-    ):
+    with pytest.raises(CalibrationRefused, match=r"8388607.*\[microphone\].*2147483647"):
         make_microphone(on_card(bits=32))
     tree = json.loads(on_card().model_dump_json(by_alias=True))
     tree["hammer"]["calibration"] = "acquisition_bench"
-    with pytest.raises(CalibrationRefused, match="full scale 32767, the station's"):
+    with pytest.raises(CalibrationRefused, match=r"32767.*8388607"):
         make_microphone(station_from_json(tree, "the test"))
 
 

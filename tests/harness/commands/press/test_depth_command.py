@@ -136,7 +136,7 @@ def test_pictures_in_no_light_or_another_channel_order_are_refused(
 def test_a_press_without_its_own_resting_picture_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     answer = _answered(capsys, LIGHT / "press_ae2.png", "--calibration", NAME)
     assert answer["deepest_m"] == pytest.approx(0.599e-3, abs=0.05e-3)
-    assert any("no resting picture was given" in note for note in answer["notes"])
+    assert any("--background" in note for note in answer["notes"])
 
 
 def test_the_thickness_is_that_of_the_sensor_and_not_of_one_with_the_same_pixels(
@@ -150,7 +150,7 @@ def test_the_thickness_is_that_of_the_sensor_and_not_of_one_with_the_same_pixels
     text = sensor_path("gelsight-r1.5").read_text()
     thin = tmp_path / "thin.toml"
     thin.write_text(text.replace('"2.5 mm"', '"0.6 mm"'))
-    assert "in a gel of 0.60 mm" in _answered(capsys, *words, "--sensor", thin, code=1)["error"]
+    assert "0.60 mm" in _answered(capsys, *words, "--sensor", thin, code=1)["error"]
     other = _answered(capsys, *words, "--sensor", "gelsight-mini")
     assert other["sensor"]["name"] == "GelSight Mini"
 
@@ -167,7 +167,7 @@ def test_frames_of_two_presses_are_refused_and_one_press_in_two_lights_is_read(
 ) -> None:
     words = ("--background", LIGHT / "rest.png", "--calibration", NAME)
     error = _answered(capsys, LIGHT / "press.png", LIGHT / "rest.png", *words, code=1)["error"]
-    assert "frame 2 of 2 differs from the first" in error
+    assert "frame 2 of 2" in error
     answer = _answered(capsys, LIGHT / "press.png", LIGHT / "press_dim.png", *words)
     assert answer["deepest_m"] == pytest.approx(0.599e-3, abs=0.05e-3)
 
@@ -236,4 +236,4 @@ def test_a_picture_of_another_camera_is_refused(
     write_png(tmp_path / "press.png", np.zeros((60, 80, 3), np.uint8))
     save_calibration(known, tmp_path / "c.npz")
     words = ("--calibration", tmp_path / "c.npz", "--out", tmp_path / "d.npz")
-    assert "own pictures" in _answered(capsys, tmp_path / "press.png", *words, code=1)["error"]
+    assert "8-bit" in _answered(capsys, tmp_path / "press.png", *words, code=1)["error"]

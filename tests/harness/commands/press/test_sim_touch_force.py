@@ -51,7 +51,7 @@ def test_a_force_comes_with_its_uncertainty_level_seconds_and_place(
 def test_a_gel_that_nobody_measured_is_said_to_be(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     answer = answered(capsys, tmp_path, "--height", saved(tmp_path, bump(0.5e-3)), "--force")
     assert answer["force_uncertainty_n"] > 0.5 * answer["force_n"]
-    assert any("nobody measured this gel's modulus" in note for note in answer["notes"])
+    assert any("--gel-modulus" in note for note in answer["notes"])
 
 
 def test_missing_heights_and_a_cut_contact_make_it_a_lower_bound(
@@ -86,7 +86,7 @@ def test_a_table_of_measured_forces_is_read_where_it_is_given(
     assert "forty presses" in answer["force"]["source"]
     where = ("--pressure-out", tmp_path / "p.npy")
     refused = _refused(capsys, tmp_path, "--force", "--force-table", tmp_path / "f.json", *where)
-    assert "how much, not where" in refused
+    assert "--pressure-out" in refused
 
 
 @pytest.mark.parametrize(
