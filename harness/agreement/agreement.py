@@ -195,10 +195,9 @@ _SHOWN = {"m": (1e3, " mm"), "m2": (1e6, " mm²"), "rad": (180.0 / np.pi, "°"),
 
 def numbers_text(numbers: Mapping[str, float]) -> str:
     """Numbers in words, each by its name and in a unit that suits it: ``read_m`` is ``read 1.95 mm``."""
-    return ", ".join(_number_text(name, value) for name, value in numbers.items())
-
-
-def _number_text(name: str, value: float) -> str:
-    words, _, unit = name.rpartition("_")
-    factor, shown = _SHOWN.get(unit, (1.0, ""))
-    return f"{(words if shown else name).replace('_', ' ')} {factor * value:.3g}{shown}"
+    said = []
+    for name, value in numbers.items():
+        words, _, unit = name.rpartition("_")
+        factor, shown = _SHOWN.get(unit, (1.0, ""))
+        said.append(f"{(words if shown else name).replace('_', ' ')} {factor * value:.3g}{shown}")
+    return ", ".join(said)

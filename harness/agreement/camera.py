@@ -14,7 +14,7 @@ import numpy as np
 from harness.agreement.agreement import Residual, SenseResiduals, SideBySide
 from harness.agreement.place_noise import PlaceNoise
 from harness.agreement.subject import Subject
-from harness.basics.arrays import BoolArray, ByteArray, FloatArray
+from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import DataRefused
 from harness.basics.geometry import apply, rotation_from_vector
 from harness.basics.mesh import Mesh
@@ -77,7 +77,13 @@ def _residuals(
 ) -> list[Residual]:
     seen = read_outline(mask_by_background(live, bare))
     outlines = (seen.extents, view.extents(np.zeros(_UNKNOWNS)))
-    read, modelled = (_filled(extents, live.shape[:2]) for extents in outlines)
+    filled = []
+    for extents in outlines:
+        corners = corners_of(SeenOutline(extents, np.zeros(len(extents), np.bool_)))
+        picture = np.zeros(live.shape[:2], np.uint8)
+        cv2.fillPoly(picture, [np.rint(corners - 0.5).astype(np.int32)], 1)
+        filled.append(picture.astype(np.bool_))
+    read, modelled = filled
     sides = SideBySide(read.astype(np.float64), modelled.astype(np.float64), "covered")
     shared = {"overlap": overlap(read, modelled)}
     found = outline_residuals(step, view, seen, places, noise)
@@ -110,17 +116,14 @@ def outline_residuals(
     # Patterns that the noise of reading hides belong to the shape.
     moving = int(np.count_nonzero(sizes > noise.read))
     parts = {"outline's place": slice(0, moving), "outline's shape": slice(moving, None)}
-    return tuple(
-        _part(step, name, along[part], variances[part]) for name, part in parts.items() if len(along[part])
-    )
-
-
-def _part(step: int, name: str, along: FloatArray, variances: FloatArray) -> Residual:
-    numbers = {
-        "rms_px": float(np.sqrt(np.mean(along**2))),
-        "sigma_px": float(np.sqrt(np.mean(variances))),
-    }
-    return Residual(step, name, float(np.sum(along**2 / variances)), float(len(along)), numbers)
+    found = []
+    for name, part in parts.items():
+        if len(along[part]):
+            rms, sigma = np.sqrt(np.mean(along[part] ** 2)), np.sqrt(np.mean(variances[part]))
+            chi_square, count = np.sum(along[part] ** 2 / variances[part]), float(len(along[part]))
+            numbers = {"rms_px": float(rms), "sigma_px": float(sigma)}
+            found.append(Residual(step, name, float(chi_square), count, numbers))
+    return tuple(found)
 
 
 class OutlineView:
@@ -169,11 +172,3 @@ class OutlineView:
             ]
         )
         return np.array([0.5 * (self.extents(one) - self.extents(-one)) for one in np.diag(sigmas)]).T
-
-
-def _filled(extents: FloatArray, shape: tuple[int, ...]) -> BoolArray:
-    """``(rows, columns)`` pixels within an outline that reaches so far."""
-    corners = corners_of(SeenOutline(extents, np.zeros(len(extents), np.bool_)))
-    picture = np.zeros(shape, np.uint8)
-    cv2.fillPoly(picture, [np.rint(corners - 0.5).astype(np.int32)], 1)
-    return picture.astype(np.bool_)

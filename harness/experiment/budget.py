@@ -62,6 +62,8 @@ def answer_as_asked(
     readings = run.read(budgets.finest)
     finest = run.solve(readings, budgets.finest)
     said, best = run.described(asked.solved), run.described(finest)
+    ours, theirs = said["position_m"], best["position_m"]
+    known = ours is not None and theirs is not None
     return {
         "asked": target.as_json(),
         "setting": asked.point.name,
@@ -76,7 +78,7 @@ def answer_as_asked(
         "finest": {
             "setting": measurement_of(experiment).setting_name(budgets.finest),
             "seconds": readings.shared[1] + finest.wall,
-            "apart_m": _apart(said, best),
+            "apart_m": float(np.linalg.norm(np.subtract(ours, theirs))) if known else None,
             **best,
         },
         "curve": {
@@ -186,13 +188,6 @@ def _promise(run: Solver, front: Front, point: Point, solved: Solved) -> float:
     if solved.radius is None or not front.vouches:
         return float("inf")
     return promise(point, solved.radius, run.object)
-
-
-def _apart(said: Mapping[str, Any], best: Mapping[str, Any]) -> float | None:
-    ours, finest = said["position_m"], best["position_m"]
-    if ours is None or finest is None:
-        return None
-    return float(np.linalg.norm(np.subtract(ours, finest)))
 
 
 def sentences(experiment: Experiment, cost: Mapping[str, Any]) -> tuple[str, ...]:

@@ -80,16 +80,11 @@ def observe_step(
         )
     struck = acquisition is not None and FORCE in record.readings
     strike = strike_from_readings(record.readings, acquisition) if struck and acquisition else None
-    return Observation(
-        _middle(poses.values[during]) @ flange_from_gel, made_square(images.values, aspect), strike
-    )
-
-
-def _middle(poses: FloatArray) -> FloatArray:
-    """``(4, 4)``: the median place and the mean attitude of ``(n, 7)`` poses at rest."""
-    quaternions = poses[:, 3:]
+    # The median place and the mean attitude of the poses at rest.
+    places, quaternions = poses.values[during][:, :3], poses.values[during][:, 3:]
     aligned = quaternions * np.sign(quaternions @ quaternions[0])[:, None]
-    return transform(rotation_from_quaternion(aligned.mean(axis=0)), np.median(poses[:, :3], axis=0))
+    middle = transform(rotation_from_quaternion(aligned.mean(axis=0)), np.median(places, axis=0))
+    return Observation(middle @ flange_from_gel, made_square(images.values, aspect), strike)
 
 
 def _needed(record: StepRecord, name: str) -> Reading:
@@ -178,10 +173,16 @@ def synchronised(strikes: Sequence[Strike | None]) -> tuple[Strike | None, ...]:
         return tuple(strikes)
     chosen = {k: strike for k in own if (strike := strikes[k]) is not None}
     delays = _delays(list(chosen.values()))
-    moved = {
-        k: strike.marked_lost(_UNPLACED) if delay is None else _moved(strike, delay)
-        for (k, strike), delay in zip(chosen.items(), delays, strict=True)
-    }
+    moved = {}
+    for (k, strike), delay in zip(chosen.items(), delays, strict=True):
+        if delay is None:
+            moved[k] = strike.marked_lost(_UNPLACED)
+            continue
+        # The sound is moved to ``delay`` s earlier; the ends keep what there is.
+        last = (len(strike.pressure) - 1) / strike.rate
+        times = np.clip(np.arange(len(strike.pressure)) / strike.rate + delay, 0.0, last)
+        pressure = resample(strike.pressure, 0.0, strike.rate, times, strike.rate)
+        moved[k] = replace(strike, pressure=read_only(pressure))
     return tuple(moved.get(k, strike) for k, strike in enumerate(strikes))
 
 
@@ -190,10 +191,19 @@ def _delays(strikes: Sequence[Strike]) -> list[float | None]:
     frequencies, transfer = _transfers(strikes)
     turns = np.exp(4j * np.pi * np.outer(_TRIED, frequencies))
     known = list(range(len(strikes)))
-    delays = _one_by_one(transfer, frequencies, turns)
+    # A place to start from: the delay by which each strike fits those before it best.
+    delays = np.zeros(len(transfer))
+    for k in range(1, len(transfer)):
+        fit = _fit(k, delays[: k + 1], transfer[: k + 1], frequencies, turns)
+        delays[k] = _TRIED[np.argmax(fit)]
     while len(known) > 1:
         delays, fits = _together(delays, transfer[known], frequencies, turns)
-        doubt = [_doubt(fit) for fit in fits]
+        # By how much each delay is too incoherent or ambiguous to be believed; not above zero where it is.
+        doubt = []
+        for fit in fits:
+            best = int(np.argmax(fit))
+            apart = np.abs(_TRIED - _TRIED[best]) > _NEXT
+            doubt.append(float(max(COHERENT - fit[best], fit[apart].max() + UNAMBIGUOUS - fit[best])))
         worst = int(np.argmax(doubt))
         if doubt[worst] <= 0.0:
             middle = float(np.median(delays))
@@ -202,15 +212,6 @@ def _delays(strikes: Sequence[Strike]) -> list[float | None]:
         del known[worst]
         delays = np.delete(delays, worst)
     return [None] * len(strikes)
-
-
-def _one_by_one(transfer: ComplexArray, frequencies: FloatArray, turns: ComplexArray) -> FloatArray:
-    """``(k,)`` s by which each strike fits those before it best: a place to start from."""
-    delays = np.zeros(len(transfer))
-    for k in range(1, len(transfer)):
-        fit = _fit(k, delays[: k + 1], transfer[: k + 1], frequencies, turns)
-        delays[k] = _TRIED[np.argmax(fit)]
-    return delays
 
 
 def _together(
@@ -245,13 +246,6 @@ def _fit(
     return fit
 
 
-def _doubt(fit: FloatArray) -> float:
-    """By how much a delay is too incoherent or ambiguous to be believed; not above zero where it is."""
-    best = int(np.argmax(fit))
-    apart = np.abs(_TRIED - _TRIED[best]) > _NEXT
-    return float(max(COHERENT - fit[best], fit[apart].max() + UNAMBIGUOUS - fit[best]))
-
-
 def _transfers(strikes: Sequence[Strike]) -> tuple[FloatArray, ComplexArray]:
     """``(f,)`` Hz and ``(k, f)`` pressure over force, each of unit power, 0 where nothing is excited."""
     rate = float(np.median([strike.rate for strike in strikes]))
@@ -274,11 +268,3 @@ def _transfer(strike: Strike, rate: float, window: FloatArray, frequencies: Floa
     excited = (strength > _FLOOR * strength.max()) & (frequencies > _LOWEST)
     ratio: ComplexArray = np.where(excited, heard / np.where(excited, driven, 1.0), 0.0)
     return np.asarray(ratio / max(float(np.linalg.norm(ratio)), _SILENT), np.complex128)
-
-
-def _moved(strike: Strike, delay: float) -> Strike:
-    """The strike with its sound ``delay`` s earlier; the ends keep what there is."""
-    last = (len(strike.pressure) - 1) / strike.rate
-    times = np.clip(np.arange(len(strike.pressure)) / strike.rate + delay, 0.0, last)
-    pressure = resample(strike.pressure, 0.0, strike.rate, times, strike.rate)
-    return replace(strike, pressure=read_only(pressure))

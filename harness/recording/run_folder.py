@@ -120,7 +120,11 @@ def create_run(
     of = known_file(scene, mesh)
     with hold_folder(folder, IN_USE), removed_on_failure(folder, OWN_NAMES):
         require_unused(folder)
-        _require_free_names(folder)
+        taken = [name for name in OWN_NAMES if os.path.lexists(folder / name)]
+        if taken:
+            raise WrongUse(
+                f"{folder} holds {', '.join(taken)}, which a run would replace; name another folder"
+            )
         carried = _carried(folder, scene, station, mesh, calibration, acquisition, of)
         header = RunHeader(
             experiment=experiment,
@@ -136,12 +140,6 @@ def create_run(
             run_id=uuid.uuid4().hex,
         )
         return Recording.create(folder, header)
-
-
-def _require_free_names(folder: Path) -> None:
-    taken = [name for name in OWN_NAMES if os.path.lexists(folder / name)]
-    if taken:
-        raise WrongUse(f"{folder} holds {', '.join(taken)}, which a run would replace; name another folder")
 
 
 def _carried(

@@ -10,7 +10,6 @@ import numpy as np
 
 from harness.authoring.catalogue.summary import QUALITY, ObjectSummary
 from harness.basics.errors import TouchstoneError
-from harness.basics.mesh import Mesh
 from harness.objectfile.vision.view import camera_for, light_for
 from harness.picture.image_file import png_bytes
 from harness.report.template import write_page
@@ -62,27 +61,15 @@ def write_catalogue_page(
     )
 
 
-def thumbnail(mesh: Mesh, side: int = _SIDE) -> bytes:
-    """A PNG of a surface in matt grey on white, from the front, the right and above.
-
-    Args:
-        mesh: of an object, in metres.
-        side: pixels.
-
-    Raises:
-        TouchstoneError: a surface that cannot be drawn.
-    """
-    camera = camera_for(mesh, side, side)
-    image = LitObject(plain(mesh, _GREY)).render(camera, [light_for(camera)], samples=2).image
-    return png_bytes(image.display())
-
-
 def _picture(each: ObjectSummary) -> str:
     """As a data URI; "" where there is none."""
     if each.object is None:
         return ""
     try:
-        return "data:image/png;base64," + base64.b64encode(thumbnail(each.object.mesh)).decode()
+        # Matt grey on white, from the front, the right and above.
+        camera = camera_for(each.object.mesh, _SIDE, _SIDE)
+        image = LitObject(plain(each.object.mesh, _GREY)).render(camera, [light_for(camera)], samples=2).image
+        return "data:image/png;base64," + base64.b64encode(png_bytes(image.display())).decode()
     except TouchstoneError:
         return ""
 

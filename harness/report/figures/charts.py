@@ -234,9 +234,16 @@ def number_marks(figure: Figure, axes: Axes, marks: FloatArray, names: Sequence[
         turns = np.pi / 4.0 + 2.0 * np.pi * np.arange(_WAYS) / _WAYS
         ring = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         ways = np.concatenate([reach * ring for reach in _RINGS])
-        prices = [
-            _price(_box(point + way, wide, high), taken, frame) + 0.02 * float(np.hypot(*way)) for way in ways
-        ]
+        # The square pt that are covered twice, much for leaving the frame, and a little for the distance.
+        prices, others = [], np.array(taken)
+        for way in ways:
+            box = _box(point + way, wide, high)
+            shared = np.minimum(box[1], others[:, 1]) - np.maximum(box[0], others[:, 0])
+            covered = float(np.clip(shared, 0.0, None).prod(axis=1).sum())
+            outside = (
+                np.clip(frame[0] - box[0], 0.0, None).sum() + np.clip(box[1] - frame[1], 0.0, None).sum()
+            )
+            prices.append(covered + 20.0 * float(outside) + 0.02 * float(np.hypot(*way)))
         way = ways[int(np.argmin(prices))]
         taken.append(_box(point + way, wide, high))
         note = axes.annotate(
@@ -272,12 +279,3 @@ def _box(middle: FloatArray, wide: float, high: float) -> FloatArray:
     """``(2, 2)``: lower left and upper right corner."""
     half = np.array([0.5 * wide, 0.5 * high])
     return np.array([middle - half, middle + half])
-
-
-def _price(box: FloatArray, taken: Sequence[FloatArray], frame: FloatArray) -> float:
-    """How many square pt are covered twice, and much for leaving the frame."""
-    others = np.array(taken)
-    shared = np.minimum(box[1], others[:, 1]) - np.maximum(box[0], others[:, 0])
-    covered = float(np.clip(shared, 0.0, None).prod(axis=1).sum())
-    outside = np.clip(frame[0] - box[0], 0.0, None).sum() + np.clip(box[1] - frame[1], 0.0, None).sum()
-    return covered + 20.0 * float(outside)

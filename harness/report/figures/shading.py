@@ -93,20 +93,16 @@ def _normals(
         if not mine.any():
             continue
         local = apply(inverse(part.base_from_part), points[mine])
-        found = _smooth(part.mesh, face[mine], local) if part.smooth else part.mesh.face_normals[face[mine]]
+        found = part.mesh.face_normals[face[mine]]
+        if part.smooth:  # blended over each face from the normals at its corners
+            at_corners = _corner_normals(part.mesh)[face[mine]]
+            blended = np.einsum("nk,nki->ni", _shares(part.mesh.corners[face[mine]], local), at_corners)
+            length = np.linalg.norm(blended, axis=1)
+            found = np.where(length[:, None] > 0.1, blended / np.maximum(length, 0.1)[:, None], found)
         normals[mine] = found @ part.base_from_part[:3, :3].T
     away = view.camera.eye - points
     facing = np.where(np.einsum("ij,ij->i", normals, away) < 0.0, -1.0, 1.0)
     return normals * facing[:, None]
-
-
-def _smooth(mesh: Mesh, face: IntArray, points: FloatArray) -> FloatArray:
-    """Normals blended over each face from those at its corners."""
-    at_corners = _corner_normals(mesh)[face]
-    blended = np.einsum("nk,nki->ni", _shares(mesh.corners[face], points), at_corners)
-    length = np.linalg.norm(blended, axis=1)
-    own = mesh.face_normals[face]
-    return np.asarray(np.where(length[:, None] > 0.1, blended / np.maximum(length, 0.1)[:, None], own))
 
 
 def _corner_normals(mesh: Mesh) -> FloatArray:

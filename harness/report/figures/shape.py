@@ -116,8 +116,12 @@ def sections_figure(answer: Mesh, truth: Mesh | None) -> Figure:
         for axes, (title, normal, shown) in zip(figure.subplots(1, 3), cuts, strict=True):
             for mesh, colour, label in ((truth, TRUTH, "true (mock)"), (answer, ANSWER, "estimate")):
                 if mesh is not None:
-                    cut = cut_by_plane(mesh, normal, float(middle[normal]))
-                    lines = [1e2 * line[:, shown] for line in cut]
+                    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+                    across = np.eye(3)[normal]
+                    cut = body.section(plane_normal=across, plane_origin=float(middle[normal]) * across)
+                    lines = [
+                        1e2 * np.asarray(line)[:, shown] for line in ([] if cut is None else cut.discrete)
+                    ]
                     axes.add_collection(LineCollection(lines, colors=colour, linewidths=1.3, label=label))
             axes.autoscale_view()
             axes.set_aspect("equal", adjustable="datalim")
@@ -125,14 +129,6 @@ def sections_figure(answer: Mesh, truth: Mesh | None) -> Figure:
             axes.set_xlabel("cm")
         axes.legend(loc="upper right", frameon=False, fontsize=8)
     return figure
-
-
-def cut_by_plane(mesh: Mesh, axis: int, height: float) -> list[FloatArray]:
-    """Lines of ``(n, 3)`` m, where the plane on which a coordinate has a value cuts a surface; joined."""
-    normal = np.eye(3)[axis]
-    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    cut = body.section(plane_normal=normal, plane_origin=height * normal)
-    return [] if cut is None else [np.asarray(line) for line in cut.discrete]
 
 
 def mask_figure(picture: ByteArray, mask: BoolArray) -> Figure:
