@@ -81,6 +81,9 @@ class FileTable:
     def numbers(self, key: str, count: int = 1) -> FloatArray:
         """Return ``(count,)`` float64 from one number for all, or from as many in any shape."""
         flat = self.array(key).ravel()
+        # A grid of occupied cells may hold true and false; a quantity may not.
+        if np.asarray(self.values[key]).dtype == np.bool_:
+            raise DataRefused(f"{self.name}/{key} is {self.values[key]}, where a number belongs")
         if flat.size not in (1, count):
             raise DataRefused(f"{self.name}/{key} has {flat.size} numbers, where there is 1, or {count}")
         return np.array(np.broadcast_to(flat, (count,)))
@@ -98,7 +101,8 @@ class FileTable:
 
     def flag(self, key: str) -> bool:
         """Return true or false, which is what a missing one is."""
-        return key in self.values and self.whole(key, 1, least=0) == 1
+        value = self.values.get(key, False)
+        return value if isinstance(value, bool) else self.whole(key, 1, least=0) == 1
 
     def box(self) -> tuple[FloatArray, FloatArray]:
         """Return the ``(3,)`` least and greatest corner of the box that a network was trained in."""

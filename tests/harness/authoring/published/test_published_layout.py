@@ -103,6 +103,10 @@ def _text(tree: Tree) -> None:
     tree["VisionNet"]["cfg"]["near"] = "close"
 
 
+def _boolean(tree: Tree) -> None:
+    tree["VisionNet"]["cfg"]["far"] = True
+
+
 def _half_a_sample(tree: Tree) -> None:
     tree["VisionNet"]["cfg"]["num_samples_per_ray"] = 2.5
 
@@ -129,6 +133,7 @@ def _disparity(tree: Tree) -> None:
         (_other_modes, "AudioNet", "f1_min has 7 numbers"),
         (_flat, "AudioNet", "no extent"),
         (_text, "VisionNet", "near"),
+        (_boolean, "VisionNet", "far is True"),
         (_half_a_sample, "VisionNet", "num_samples_per_ray"),
         (_huge, "VisionNet", "resolution"),
         (_empty, "VisionNet", "empty"),
