@@ -116,7 +116,9 @@ def object_touch(
             f"{SHAPES.name} = {SHAPES.default}"
         )
     # Graphs are loaded by those alone who take touch from an ObjectFile.
-    from harness.objectfile.touch.level import tool_depth_from
+    from harness.objectfile.touch.level import require_own_touch
+    from harness.objectfile.touch.tool_depth import open_tool_depth
 
     solid = walled(mesh, scene.object.wall)
-    return tool_depth_from(of, solid, station.gel.sensor, calibration.header.skirt)
+    require_own_touch(of, solid, station.gel.sensor, calibration.header.skirt)
+    return open_tool_depth(of)

@@ -43,11 +43,13 @@ def _presses(given: Given, _levels: Levels) -> "Presses":
 
 def _codes(given: Given, _levels: Levels) -> "ObjectTouch":
     # Loaded by those alone who take touch from an ObjectFile.
-    from harness.objectfile.touch.level import touch_from
+    from harness.objectfile.touch.level import require_own_touch
+    from harness.objectfile.touch.touch import open_touch
 
     solid = walled(given["object.mesh"], given["object.wall"])
     skirt = given["sensor.calibration"].header.skirt
-    return touch_from(given["object.file"], solid, given["sensor"], skirt)
+    require_own_touch(given["object.file"], solid, given["sensor"], skirt)
+    return open_touch(given["object.file"])
 
 
 def _gel(given: Given, _levels: Levels) -> FloatArray:

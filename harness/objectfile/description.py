@@ -119,15 +119,10 @@ def read_tree(path: Path) -> Any:
             path.read_text(encoding="utf-8"), parse_constant=_no_constant, object_pairs_hook=_no_twins
         )
     except (ValueError, RecursionError) as error:
-        raise DataRefused(
-            f"{path} is not JSON{_why(error)}; copy it again, or build the object again"
-        ) from error
-
-
-def _why(error: Exception) -> str:
-    if isinstance(error, json.JSONDecodeError):
-        return f" from line {error.lineno} on"
-    return f" ({error})" if isinstance(error, _Ambiguous) else ""
+        reason = f" ({error})" if isinstance(error, _Ambiguous) else ""
+        if isinstance(error, json.JSONDecodeError):
+            reason = f" from line {error.lineno} on"
+        raise DataRefused(f"{path} is not JSON{reason}; copy it again, or build the object again") from error
 
 
 def description_from(tree: Any, where: str) -> Description:

@@ -4,7 +4,7 @@ Files are read on first use, each against its hash. Reading runs nothing of what
 """
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -153,22 +153,6 @@ def create_object(
     description = description_from(described, str(folder / DESCRIPTION))
     write_described(folder, description, {MESH: data})
     return ObjectFile(folder, description)
-
-
-def copied(of: ObjectFile, folder: Path, files: Iterable[FileEntry]) -> ObjectFile:
-    """A copy that says the same and holds some of the files: what needs no other can use it.
-
-    Args:
-        of: copied.
-        folder: made; what is there of the same names is replaced.
-        files: that are copied beside ``object.json``.
-
-    Raises:
-        DataRefused: one of them is missing or damaged.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    write_described(folder, of.description, {entry.file: of.read(entry) for entry in files})
-    return ObjectFile(folder, of.description)
 
 
 def with_part(

@@ -54,7 +54,8 @@ def checked_graph(data: bytes, name: str) -> ModelProto:
     try:
         onnx.checker.check_model(model, full_check=True)
     except (onnx.checker.ValidationError, onnx.shape_inference.InferenceError, ValueError) as error:
-        raise DataRefused(f"{name} is not a valid graph ({_first_line(error)}); {_AGAIN}") from error
+        reason = " ".join(str(error).split())[:200]
+        raise DataRefused(f"{name} is not a valid graph ({reason}); {_AGAIN}") from error
     _check_inputs(model, name)
     require_bounded(model, name)
     return model
@@ -164,7 +165,3 @@ def with_outputs(model: ModelProto, names: Sequence[str]) -> bytes:
     return helper.make_model(
         alone, ir_version=model.ir_version, opset_imports=model.opset_import
     ).SerializeToString()
-
-
-def _first_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]

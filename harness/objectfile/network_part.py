@@ -55,16 +55,16 @@ def network_entry(part: NetworkPart, contents: dict[str, bytes]) -> NetworkEntry
 
 def _self_test(network: Network, part: NetworkPart) -> SelfTest:
     found = network(part.asked)
+    outputs = []
+    for tensor in part.outputs:
+        values = found[tensor.name].ravel()
+        at = part.kept(values)
+        outputs.append(Sampled(name=tensor.name, at=tuple(at.tolist()), values=tuple(values[at].tolist())))
     return SelfTest(
         rows=len(next(iter(part.asked.values()))),
         inputs=tuple(
             Whole(name=key, values=tuple(values.ravel().tolist())) for key, values in part.asked.items()
         ),
-        outputs=tuple(_sampled(tensor.name, found[tensor.name].ravel(), part) for tensor in part.outputs),
+        outputs=tuple(outputs),
         tolerance=part.tolerance,
     )
-
-
-def _sampled(name: str, found: AnyArray, part: NetworkPart) -> Sampled:
-    at = part.kept(found)
-    return Sampled(name=name, at=tuple(at.tolist()), values=tuple(found[at].tolist()))

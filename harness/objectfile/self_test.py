@@ -1,12 +1,12 @@
 """Whether a network answers as it did when it was made: another's does not, whatever its hash."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
-from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused
-from harness.objectfile.entries import Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
+from harness.objectfile.entries import NetworkEntry, Sampled, SelfTest, Tensor, Whole
 from harness.objectfile.runtime import Network
 
 
@@ -33,13 +33,9 @@ def require_self_test(network: Network, test: SelfTest) -> float:
     Raises:
         DataRefused: it is more than the tolerance, or the test is none.
     """
-    return require_answers(network.name, network(all_queries(network.inputs, test)), test)
-
-
-def all_queries(inputs: Sequence[Input], test: SelfTest) -> dict[str, AnyArray]:
-    """The queries of a self-test, by the names of a network's inputs; errors as of ``queries_of``."""
-    named = zip(inputs, test.inputs, strict=True)
-    return {item.name: queries_of(item, values, test.rows) for item, values in named}
+    named = zip(network.inputs, test.inputs, strict=True)
+    queries = {item.name: queries_of(item, values, test.rows) for item, values in named}
+    return require_answers(network.name, network(queries), test)
 
 
 def require_answers(name: str, outputs: Mapping[str, AnyArray], test: SelfTest) -> float:
@@ -76,12 +72,6 @@ def queries_of(item: Tensor, kept: Whole, rows: int) -> AnyArray:
             "build it again"
         )
     return np.array(kept.values, dtype=item.dtype).reshape(shape)
-
-
-def asked_points(entry: NetworkEntry) -> FloatArray:
-    """``(n, 3)`` m: where the network of a sound was asked when it was made, on its object's surface."""
-    test = entry.self_test
-    return np.asarray(queries_of(entry.inputs[0], test.inputs[0], test.rows), np.float64)
 
 
 def _gap(found: AnyArray, kept: Sampled) -> float:

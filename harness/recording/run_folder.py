@@ -27,7 +27,7 @@ from harness.bench.station_file import Station, station_from_json
 from harness.effects.accuracy import Level
 from harness.effects.file_levels import network_levels, senses_of
 from harness.effects.scene_object import known_file
-from harness.objectfile.file import ObjectFile, copied
+from harness.objectfile.file import ObjectFile, write_described
 from harness.objects.builtin import DESCRIPTION
 from harness.recording.recording import HEADER, IN_USE, STEPS, Recording, RunHeader, require_unused
 from harness.sim.optics.lit_calibration import named_calibration, read_calibration, shadow_of
@@ -162,7 +162,9 @@ def _carried(
         write_bytes_whole(folder / SENSOR, sensor_path(station.gel.make).read_bytes())
         carried.append(SENSOR)
     if of is not None:
-        copied(of, folder / OBJECTFILE, of.description.files_of(senses_of(scene)))
+        (folder / OBJECTFILE).mkdir(parents=True, exist_ok=True)
+        contents = {entry.file: of.read(entry) for entry in of.description.files_of(senses_of(scene))}
+        write_described(folder / OBJECTFILE, of.description, contents)
         carried.append(_DESCRIBED)
     return carried
 

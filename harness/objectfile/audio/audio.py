@@ -15,7 +15,7 @@ from harness.basics.arrays import AnyArray, FloatArray, read_only
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.mesh import Mesh
 from harness.objectfile.audio.table import HalfArray, interpolated, table_from
-from harness.objectfile.entries import AudioEntry, TableEntry
+from harness.objectfile.entries import AudioEntry
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.surface_file import mesh_from_ply
 from harness.objectfile.surface_search import SurfaceSearch, checked_points, require_own
@@ -170,12 +170,17 @@ def open_audio(of: ObjectFile, level: AudioLevel = "network", threads: int = 1) 
     match level:
         case "network" if entry.network is not None:
             # What runs graphs is heavy, and a table needs none of it.
-            from harness.objectfile.self_test import asked_points, open_network
+            from harness.objectfile.self_test import open_network, queries_of
 
-            require_own(surface, asked_points(entry.network), entry.network.file)
+            asked, test = entry.network.inputs[0], entry.network.self_test
+            points = np.asarray(queries_of(asked, test.inputs[0], test.rows), np.float64)
+            require_own(surface, points, entry.network.file)
             shapes = NetworkShapes(open_network(of.read(entry.network), entry.network, threads))
         case "table" if entry.table is not None:
-            shapes = _table(of, entry.table, entry.near_surface_m)
+            nodes = mesh_from_ply(of.read(entry.table.surface), entry.table.surface.file)
+            scales = np.array(entry.table.scales)
+            table = table_from(of.read(entry.table), entry.table.file, (len(nodes.vertices), len(scales), 3))
+            shapes = TableShapes(table, scales, SurfaceSearch(nodes), _LIKELY * entry.near_surface_m)
         case "network" | "table":
             raise DataRefused(f"the sound of {name} has no {level}; take the other level, or build it again")
         case _:
@@ -189,10 +194,3 @@ def open_audio(of: ObjectFile, level: AudioLevel = "network", threads: int = 1) 
         surface=surface,
         shapes=shapes,
     )
-
-
-def _table(of: ObjectFile, entry: TableEntry, most: float) -> TableShapes:
-    surface = mesh_from_ply(of.read(entry.surface), entry.surface.file)
-    shape = (len(surface.vertices), len(entry.scales), 3)
-    table = table_from(of.read(entry), entry.file, shape)
-    return TableShapes(table, np.array(entry.scales), SurfaceSearch(surface), _LIKELY * most)

@@ -96,7 +96,8 @@ def checked_force(force: ArrayLike, unit: str) -> tuple[FloatArray, float]:
     """
     vector = np.array(force, dtype=np.float64)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise WrongUse(f"a force {_written(vector)} is not three finite numbers in {unit}; say x, y and z")
+        shown = ", ".join(f"{value:g}" for value in vector.ravel()[:4])
+        raise WrongUse(f"a force ({shown}) is not three finite numbers in {unit}; say x, y and z")
     size = math.hypot(*vector.tolist())
     if size == 0.0:
         raise WrongUse("a force of 0 strikes nothing; say one above 0, or none for the inward normal")
@@ -185,7 +186,3 @@ def pulse_lasting(duration: float, mass: float, speed: float) -> HertzPulse:
         raise WrongUse(f"a contact of {duration:g} s is a push and no blow; say at most {LONGEST:g} s")
     momentum = mass * speed
     return HertzPulse(duration, _PEAKED * momentum / duration, 2.0 * momentum, duration * speed / DURATION)
-
-
-def _written(vector: FloatArray) -> str:
-    return "(" + ", ".join(f"{value:g}" for value in vector.ravel()[:4]) + ")"

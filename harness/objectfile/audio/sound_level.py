@@ -59,21 +59,16 @@ def modes_from(
     _require_dampings(of, entry, material)
     count = _count(of, entry, most, limit)
     sound = open_audio(of, level)
-    everywhere = sound.as_modes(_nodes(of, entry) if level == "network" else None)
+    nodes: Mesh | None = None
+    # A network is evaluated at the table's nodes, which are those of the elements; without a table at the
+    # vertices of the object's mesh, whose faces are divided as finely as elements would be.
+    if level == "network" and entry.table is not None:
+        nodes = mesh_from_ply(of.read(entry.table.surface), entry.table.surface.file)
+    elif level == "network":
+        nodes = with_edges_below(of.mesh, default_edge(of.mesh, of.material, entry.frequencies_hz[-1]))
+    everywhere = sound.as_modes(nodes)
     lowest = _lowest(everywhere, count, limit)
     return replace(lowest, seconds={"objectfile": time.perf_counter() - begun})
-
-
-def _nodes(of: ObjectFile, entry: AudioEntry) -> Mesh:
-    """Where the network is evaluated: at the table's nodes, which are those of the elements.
-
-    Without a table, at the vertices of the object's mesh. It may have faces as long as the object, over which
-    no shape is linear; they are divided as finely as elements would be.
-    """
-    if entry.table is None:
-        highest = entry.frequencies_hz[-1]
-        return with_edges_below(of.mesh, default_edge(of.mesh, of.material, highest))
-    return mesh_from_ply(of.read(entry.table.surface), entry.table.surface.file)
 
 
 def _require_dampings(of: ObjectFile, entry: AudioEntry, material: Material) -> None:
@@ -104,13 +99,11 @@ def _count(of: ObjectFile, entry: AudioEntry, most: int, limit: float) -> int:
             f"with --modes {most}"
         )
     count = min(most, heard)
-    while 0 < count < len(frequencies) and _one(frequencies[count - 1], frequencies[count]):
+    while 0 < count < len(frequencies) and (
+        frequencies[count] - frequencies[count - 1] <= _SAME * frequencies[count]
+    ):
         count -= 1
     return count or min(most, heard)
-
-
-def _one(lower: float, upper: float) -> bool:
-    return bool(upper - lower <= _SAME * upper)
 
 
 def _lowest(modes: Modes, count: int, limit: float) -> Modes:

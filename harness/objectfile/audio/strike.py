@@ -176,14 +176,11 @@ def pushes(audio: ObjectAudio, mesh: Mesh, count: int) -> FloatArray:
         audio.at(mesh.vertices[first : first + CHUNK])[:, :count]
         for first in range(0, len(mesh.vertices), CHUNK)
     ]
-    return np.asarray(-np.einsum("fckd,fcd->fck", np.concatenate(lowest)[mesh.faces], _corner_normals(mesh)))
-
-
-def _corner_normals(mesh: Mesh) -> FloatArray:
-    """``(f, 3, 3)``: those of the vertices where a face is part of a bend, its own next to an edge."""
+    # Normals of the vertices where a face is part of a bend, the face's own next to an edge.
     at_vertices, own = mesh.vertex_normals[mesh.faces], mesh.face_normals[:, None]
     bent = np.einsum("fcd,fcd->fc", at_vertices, np.broadcast_to(own, at_vertices.shape)) > _CREASE
-    return np.where(bent[..., None], at_vertices, own)
+    normals = np.where(bent[..., None], at_vertices, own)
+    return np.asarray(-np.einsum("fckd,fcd->fck", np.concatenate(lowest)[mesh.faces], normals))
 
 
 def _check_length(duration: float, rate: float, blow: HammerBlow) -> None:

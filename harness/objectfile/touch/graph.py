@@ -96,7 +96,10 @@ def codes_graph(
     moved = nodes.add("Transpose", nodes.add("Cast", "node_from_gel", to=TensorProto.FLOAT), perm=[0, 2, 1])
     scale = np.array([1.0 / half_width, 1.0 / half_width, 1.0], np.float32)
     motion = PatchRays(nodes, nodes.add("Mul", moved, nodes.constant(scale)), sensor, patches.outside)
-    coarse, half = _coarseness(patches, sensor)
+    # Pixels a side to one ray of the first look-ups, and of those of covers. A cover is linear between a
+    # patch's pixels: half the rays see all of it where they are closer.
+    coarse = ray_pixels(sensor.rows, sensor.columns)
+    half = 2 if coarse > 1 and 2.0 * sensor.pitch <= patches.pitch else 1
     near: str | None = None
     for _ in range(lookups - 1):
         near = motion.clipped(motion.to_height(heights, near, coarse, coarse))
@@ -106,7 +109,13 @@ def codes_graph(
     limits = [nodes.constant(np.array(value, np.float32)) for value in (0.0, sensor.gel_thickness)]
     deep = nodes.add("Clip", reached, *limits)
     nodes.add("Identity", hung(nodes, deep, sensor, skirt), name="maps")
-    _gaps(nodes, motion, (heights, covers), near, coarse)
+    # The output ``gaps`` is of the coarse rays, which are followed beyond the gel's reach.
+    for _ in range(_BEYOND):
+        near = motion.to_height(heights, near, coarse, coarse)
+    assert near is not None
+    far = nodes.constant(np.array(SEARCH_DEPTH, np.float32))
+    found = motion.covered(motion.look_up(covers, near, coarse, coarse))
+    nodes.add("Min", nodes.add("Where", found, near, far), far, name="gaps")
     return nodes.model(
         "touch",
         [
@@ -122,17 +131,6 @@ def codes_graph(
         "A node (n, 1) and the gel's pose in its frame (n, 3, 4), m, to indentation (n, rows, columns), m, "
         "and to the gap between gel and object, m, of coarser rays.",
     )
-
-
-def _gaps(nodes: Nodes, motion: PatchRays, images: tuple[str, str], near: str | None, coarse: int) -> None:
-    """The output ``gaps``: of the coarse rays, which are followed beyond the gel's reach."""
-    heights, covers = images
-    for _ in range(_BEYOND):
-        near = motion.to_height(heights, near, coarse, coarse)
-    assert near is not None
-    far = nodes.constant(np.array(SEARCH_DEPTH, np.float32))
-    covered = motion.covered(motion.look_up(covers, near, coarse, coarse))
-    nodes.add("Min", nodes.add("Where", covered, near, far), far, name="gaps")
 
 
 def _patch(nodes: Nodes, patches: PatchCodes) -> tuple[str, str]:
@@ -162,13 +160,6 @@ def _columns(nodes: Nodes, rows: str, index: str) -> str:
     """``(n, m)`` columns of ``(n, k)``, taken as rows of the transpose, which is thrice as fast."""
     taken = nodes.add("Gather", nodes.add("Transpose", rows, perm=[1, 0]), index, axis=0)
     return nodes.add("Transpose", taken, perm=[1, 0])
-
-
-def _coarseness(patches: PatchCodes, sensor: TactileSensor) -> tuple[int, int]:
-    """Pixels a side to one ray of the first look-ups, and of those of covers."""
-    coarse = ray_pixels(sensor.rows, sensor.columns)
-    # A cover is linear between a patch's pixels: half the rays see all of it where they are closer.
-    return coarse, 2 if coarse > 1 and 2.0 * sensor.pitch <= patches.pitch else 1
 
 
 def _check(patches: PatchCodes, sensor: TactileSensor, lookups: int) -> None:

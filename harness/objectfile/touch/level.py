@@ -7,8 +7,6 @@ from harness.basics.mesh import Mesh
 from harness.bench.sensor import TactileSensor
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.same_object import require_same_shape
-from harness.objectfile.touch.tool_depth import CodedDepth, open_tool_depth
-from harness.objectfile.touch.touch import ObjectTouch, open_touch
 from harness.objectfile.touch_entries import GelEntry
 from harness.sim.gel.gel import GelSkirt
 
@@ -19,14 +17,8 @@ _SAME = 1e-6
 """Relative, by which lengths of one gel may differ: more than JSON rounds them by."""
 
 
-def tool_depth_from(of: ObjectFile, surface: Mesh, sensor: TactileSensor, skirt: GelSkirt) -> CodedDepth:
-    """The object along a tool, by the codes of its ObjectFile; arguments and errors as of ``touch_from``."""
-    _require_own(of, surface, sensor, skirt)
-    return open_tool_depth(of)
-
-
-def touch_from(of: ObjectFile, surface: Mesh, sensor: TactileSensor, skirt: GelSkirt) -> ObjectTouch:
-    """Open the codes of an object's touch.
+def require_own_touch(of: ObjectFile, surface: Mesh, sensor: TactileSensor, skirt: GelSkirt) -> None:
+    """Refuse the touch of another object or of another gel than the one that is pressed.
 
     Args:
         of: of this object; its material is not asked for.
@@ -36,13 +28,8 @@ def touch_from(of: ObjectFile, surface: Mesh, sensor: TactileSensor, skirt: GelS
 
     Raises:
         WrongUse: an ObjectFile of another object or another gel; what differs is said.
-        DataRefused: it has no touch or no codes, or a file of it is damaged.
+        DataRefused: it has no touch.
     """
-    _require_own(of, surface, sensor, skirt)
-    return open_touch(of)
-
-
-def _require_own(of: ObjectFile, surface: Mesh, sensor: TactileSensor, skirt: GelSkirt) -> None:
     entry = of.description.touch
     if entry is None:
         raise DataRefused(

@@ -14,7 +14,10 @@ def hung(nodes: Nodes, deep: str, sensor: TactileSensor, skirt: GelSkirt) -> str
     core = nodes.add("Mul", deepest, nodes.constant(np.array(skirt.core, np.float32)))
     kept = nodes.add("Greater", deep, core)
     widths = sorted({*skirt.kernels, skirt.final} - {1})
-    blurs = {width: _blur(nodes, sensor, width) for width in widths}
+    blurs = {}
+    for width in widths:
+        down, along = blur_matrix(sensor.rows, width), blur_matrix(sensor.columns, width)
+        blurs[width] = nodes.constant(down), nodes.constant(along.T)
     surface = deep
     for width in skirt.kernels:
         blurred = _blurred(nodes, surface, blurs[width]) if width > 1 else surface
@@ -22,11 +25,6 @@ def hung(nodes: Nodes, deep: str, sensor: TactileSensor, skirt: GelSkirt) -> str
     if skirt.final > 1:
         surface = _blurred(nodes, surface, blurs[skirt.final])
     return surface
-
-
-def _blur(nodes: Nodes, sensor: TactileSensor, width: int) -> tuple[str, str]:
-    down, along = blur_matrix(sensor.rows, width), blur_matrix(sensor.columns, width)
-    return nodes.constant(down), nodes.constant(along.T)
 
 
 def _blurred(nodes: Nodes, image: str, blur: tuple[str, str]) -> str:

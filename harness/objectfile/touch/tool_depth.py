@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
+from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import WrongUse
-from harness.basics.mesh import Mesh
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.runtime import Network
 from harness.objectfile.self_test import open_network
@@ -66,8 +65,13 @@ class CodedDepth:
         depth = np.full((rows, columns), np.inf)
         chosen = self._chosen(view_from_object)
         for tops, lefts, depths in self._tiles(chosen, view_from_object, pitch, depth.shape):
-            for top, left, tile in zip(tops, lefts, depths[:, ::every, ::every], strict=True):
-                _keep_nearest(depth, int(top), int(left), tile)
+            for top, left, tile in zip(
+                tops.tolist(), lefts.tolist(), depths[:, ::every, ::every], strict=True
+            ):
+                cut = tile[max(0, -top) : max(0, rows - top), max(0, -left) : max(0, columns - left)]
+                if cut.size:
+                    place = depth[max(0, top) :, max(0, left) :][: cut.shape[0], : cut.shape[1]]
+                    np.minimum(place, cut, out=place)
         return read_only(depth)
 
     def _chosen(self, view_from_object: FloatArray) -> IntArray:
@@ -115,24 +119,11 @@ class CodedDepth:
         for start in range(0, len(chosen), _CHUNK):
             part = slice(start, start + _CHUNK)
             gaps = self.network(self.nodes.posed(self.owners[chosen[part]], poses[part]))["gaps"]
-            beyond = (gaps >= np.float32(SEARCH_DEPTH)) | _about(gaps <= -self.gel.thickness_m)
-            met = np.where(beyond, np.inf, gaps)
+            behind = gaps <= -self.gel.thickness_m
+            if behind.any():  # and the rays next to those, whose heights lie between two surfaces
+                behind = maximum_filter(behind, size=(1, 3, 3), mode="nearest")
+            met = np.where((gaps >= np.float32(SEARCH_DEPTH)) | behind, np.inf, gaps)
             yield at[part, 1], at[part, 0], centres[part, 2, None, None] + met
-
-
-def _about(marked: BoolArray) -> BoolArray:
-    """``(n, rows, columns)``, with the rays next to those marked, whose heights lie between two surfaces."""
-    if not marked.any():
-        return marked
-    return np.asarray(maximum_filter(marked, size=(1, 3, 3), mode="nearest"))
-
-
-def _keep_nearest(depth: FloatArray, top: int, left: int, tile: FloatArray) -> None:
-    rows, columns = depth.shape
-    cut = tile[max(0, -top) : max(0, rows - top), max(0, -left) : max(0, columns - left)]
-    if cut.size:
-        place = depth[max(0, top) :, max(0, left) :][: cut.shape[0], : cut.shape[1]]
-        np.minimum(place, cut, out=place)
 
 
 def open_tool_depth(of: ObjectFile, threads: int = 1) -> CodedDepth:
@@ -147,16 +138,12 @@ def open_tool_depth(of: ObjectFile, threads: int = 1) -> CodedDepth:
     """
     touch, entry = touch_of(of), coded(of)
     nodes = NodeSearch(nodes_of(of, entry), entry.most_off_m)
-    places = _spread(of.mesh)
+    mesh = of.mesh
+    count = max(2000, int(_TRIED * float(mesh.face_areas.sum()) / SPREAD**2))
+    points, faces = random_points(mesh, count, np.random.default_rng(0))
+    facing = np.ascontiguousarray(mesh.face_normals[faces])
+    places = SurfaceNodes(points, facing)[thin(points, facing, SPREAD)]
     owners, gaps = nodes.nearest_to(places)
     reached = gaps <= entry.most_off_m
     network = open_network(of.read(entry.network), entry.network, threads, ("gaps",))
     return CodedDepth(network, nodes, touch.gel, places[reached], owners[reached], entry.stated_rms)
-
-
-def _spread(mesh: Mesh) -> SurfaceNodes:
-    """Places ``SPREAD`` apart."""
-    count = max(2000, int(_TRIED * float(mesh.face_areas.sum()) / SPREAD**2))
-    points, faces = random_points(mesh, count, np.random.default_rng(0))
-    facing = np.ascontiguousarray(mesh.face_normals[faces])
-    return SurfaceNodes(points, facing)[thin(points, facing, SPREAD)]

@@ -37,7 +37,13 @@ class Check:
 
 def verify(of: ObjectFile | PublishedObject) -> list[Check]:
     """Look at everything; a failure ends its own check alone. An import has no mesh to look at."""
-    return [_tried(name, look) for name, look in _looks(of)]
+    checks = []
+    for name, look in _looks(of):
+        try:
+            checks.append(Check(name, True, look()))
+        except TouchstoneError as error:
+            checks.append(Check(name, False, str(error)))
+    return checks
 
 
 def _looks(of: ObjectFile | PublishedObject) -> Iterator[tuple[str, Callable[[], str]]]:
@@ -65,13 +71,6 @@ def _looks(of: ObjectFile | PublishedObject) -> Iterator[tuple[str, Callable[[],
     if vision is not None:
         yield "vision: networks", partial(look_at_networks, of, vision)
         yield "vision: networks and surface", partial(look_at_looks, of, vision)
-
-
-def _tried(name: str, look: Callable[[], str]) -> Check:
-    try:
-        return Check(name, True, look())
-    except TouchstoneError as error:
-        return Check(name, False, str(error))
 
 
 def _bytes(of: ObjectFile | PublishedObject, entry: FileEntry) -> str:

@@ -74,20 +74,17 @@ def camera_for(
     require_size(width, height)
     middle = mesh.bounds.mean(axis=0) if target is None else np.asarray(target, np.float64)
     if eye is None:
-        eye = middle + _distance(mesh, width, height, field_of_view) * _FROM / np.linalg.norm(_FROM)
+        # The ball around the object's box fills the shorter side of the picture.
+        half = np.arctan(np.tan(0.5 * field_of_view) * min(1.0, height / width))
+        with np.errstate(divide="ignore"):  # an angle of none is refused where the camera is made
+            distance = float(0.5 * _MARGIN * mesh.diagonal / np.sin(half))
+        eye = middle + distance * _FROM / np.linalg.norm(_FROM)
     if up is None:
         away = np.asarray(eye, np.float64) - middle
         # Along z nothing of z is up; beside it the picture would turn with the least change of the eye.
         is_steep = np.hypot(*away[:2]) < 1e-3 * np.abs(away[2])
         up = (0.0, 1.0, 0.0) if is_steep else (0.0, 0.0, 1.0)
     return Pinhole.looking_at(eye, middle, up, width, height, field_of_view)
-
-
-def _distance(mesh: Mesh, width: int, height: int, field_of_view: float) -> float:
-    """Metres from which the ball around an object's box fills the shorter side of a picture."""
-    half = np.arctan(np.tan(0.5 * field_of_view) * min(1.0, height / width))
-    with np.errstate(divide="ignore"):  # an angle of none is refused where the camera is made
-        return float(0.5 * _MARGIN * mesh.diagonal / np.sin(half))
 
 
 def light_for(camera: Pinhole) -> DirectionalLight:
