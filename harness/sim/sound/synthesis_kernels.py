@@ -1,4 +1,4 @@
-"""Two tables whose product is a sum of decaying sines, in machine code.
+"""Two tables whose product is a sum of decaying sines.
 
 Sample ``b B + j`` of a mode is the imaginary part of ``g z^(b B) z^j``, ``z`` its step of one sample.
 One table holds ``g z^(b B)`` for every block ``b``, the other ``z^j`` within one block; both come by
@@ -7,35 +7,18 @@ then left is one product of matrices, in the precision of the tables.
 
 Modes lie in tiles of ``TILE``: a row of a table is, tile after tile, ``TILE`` first parts and ``TILE``
 second parts, so that the first tiles of a row, those that still sound, are one piece of memory.
-
-Powers of sixteen complex steps at a time, held in registers from row to row.
-
-Loops of numba write each power to memory and read it again, which took nine times as long. Registers
-narrower than sixteen numbers are used in pairs or more: LLVM splits what the machine does not have.
 """
 
 import threading
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.compiled import compiled
 
 TILE = 16
-"""Modes side by side; two registers of eight double numbers."""
-
-_NUMBER = ir.DoubleType()
-_VECTOR = ir.VectorType(_NUMBER, TILE)
-_BYTES = 8
-_MAY_FUSE = ("contract",)
-_loop: Any = cgutils.for_range
-_variable: Any = cgutils.alloca_once
+"""Modes side by side: a row of them is turned at once, in the registers of vectors."""
 
 _KEPT = 1 << 24
 """Bytes of working memory that a thread keeps from one sound to the next."""
@@ -95,6 +78,7 @@ def block_counts(
     return counts
 
 
+@compiled
 def fill(
     table: AnyArray, rows: IntArray, first: FloatArray, step: FloatArray, floor: float, swapped: bool
 ) -> None:
@@ -108,28 +92,25 @@ def fill(
         floor: what is smaller is zero, so that no product of two tables loses its leading bit.
         swapped: the imaginary parts come before the real ones in each tile.
     """
-    _fill(table, rows, first, step, floor * floor, swapped)
-
-
-@compiled
-def _fill(
-    table: AnyArray, rows: IntArray, first: FloatArray, step: FloatArray, least: float, swapped: bool
-) -> None:
-    # Known when this is compiled for a type, so that only one of both turns is in its code.
-    size, wide = np.int64(table.itemsize), table.shape[1]
-    out: Any = np.int64(table.ctypes.data)
-    ahead: Any = np.int64(first.ctypes.data)
-    on: Any = np.int64(step.ctypes.data)
-    below = 8 * first.shape[1]
+    least = floor * floor
+    power_re, power_im = np.empty(TILE), np.empty(TILE)
     for tile in range(len(rows)):
-        at = out + size * 2 * TILE * tile
-        real, imag = (at + size * TILE, at) if swapped else (at, at + size * TILE)
-        lane = 8 * TILE * tile
-        place, step_at, apart = ahead + lane, on + lane, size * wide
-        if size == 4:
-            turn_single(real, imag, apart, rows[tile], place, place + below, step_at, step_at + below, least)
+        lane, real, imag = TILE * tile, 2 * TILE * tile, 2 * TILE * tile
+        if swapped:
+            real += TILE
         else:
-            turn_double(real, imag, apart, rows[tile], place, place + below, step_at, step_at + below, least)
+            imag += TILE
+        step_re, step_im = step[0, lane : lane + TILE], step[1, lane : lane + TILE]
+        for k in range(TILE):
+            power_re[k], power_im[k] = first[0, lane + k], first[1, lane + k]
+        for row in range(rows[tile]):
+            out = table[row]
+            for k in range(TILE):
+                re, im = power_re[k], power_im[k]
+                out[real + k] = re if re * re > least else 0.0
+                out[imag + k] = im if im * im > least else 0.0
+                power_re[k] = re * step_re[k] - im * step_im[k]
+                power_im[k] = re * step_im[k] + im * step_re[k]
 
 
 @compiled
@@ -162,66 +143,6 @@ def largest_rest(
             left *= slower
     return float(rests.max())
 
-
-def _loaded(builder: Any, place: Any) -> Any:
-    """Sixteen numbers at an address."""
-    return builder.load(builder.inttoptr(place, _VECTOR.as_pointer()), align=_BYTES)
-
-
-def _product(builder: Any, left: Any, right: Any) -> Any:
-    return builder.fmul(left, right, flags=_MAY_FUSE)
-
-
-def _turning(element: Any) -> Callable[..., Any]:
-    """Code that writes rows of powers as numbers of one type.
-
-    Called with the addresses of the first row's real and imaginary parts, the bytes from one row to
-    the next, the number of rows, the addresses of the real and imaginary parts of the first power
-    and of the step, and the square below which a part is written as zero.
-    """
-    row = ir.VectorType(element, TILE)
-    narrow = element != _NUMBER
-
-    def code(
-        _typing: Any, _real: Any, _imag: Any, _apart: Any, _rows: Any, _first_re: Any, _first_im: Any,
-        _step_re: Any, _step_im: Any, _least: Any,
-    ) -> Any:  # fmt: skip
-        def generate(context: Any, builder: Any, _signature: Any, given: Any) -> Any:
-            *outs, apart, rows, first_re, first_im, step_re, step_im, square = given
-            step = (_loaded(builder, step_re), _loaded(builder, step_im))
-            # One number, sixteen times.
-            first = ir.Constant(ir.IntType(32), 0)
-            alone = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), square, first)
-            lanes = ir.Constant(ir.VectorType(ir.IntType(32), TILE), [0] * TILE)
-            least = builder.shuffle_vector(alone, alone, lanes)
-            power = [_variable(builder, _VECTOR) for _ in outs]
-            for part, place in zip(power, (first_re, first_im), strict=True):
-                builder.store(_loaded(builder, place), part)
-            with _loop(builder, rows) as loop:
-                on = builder.mul(apart, loop.index)
-                now = (builder.load(power[0]), builder.load(power[1]))
-                for part, out in zip(now, outs, strict=True):
-                    loud = builder.fcmp_ordered(">", builder.fmul(part, part), least)
-                    kept = builder.select(loud, part, ir.Constant(_VECTOR, [0.0] * TILE))
-                    written = builder.fptrunc(kept, row) if narrow else kept
-                    to = builder.inttoptr(builder.add(out, on), row.as_pointer())
-                    builder.store(written, to, align=4 if narrow else _BYTES)
-                # Real and imaginary part of the product of two complex numbers.
-                lost = _product(builder, now[1], step[1])
-                gained = _product(builder, now[1], step[0])
-                real = builder.fsub(_product(builder, now[0], step[0]), lost, flags=_MAY_FUSE)
-                imag = builder.fadd(_product(builder, now[0], step[1]), gained, flags=_MAY_FUSE)
-                for part, value in zip(power, (real, imag), strict=True):
-                    builder.store(value, part)
-            return context.get_dummy_value()
-
-        return types.void(*[types.int64] * 8, types.float64), generate
-
-    return code
-
-
-turn_single: Any = intrinsic(_turning(ir.FloatType()))
-turn_double: Any = intrinsic(_turning(_NUMBER))
 
 MEMORY = Memory()
 """Of whoever sums a sound."""
