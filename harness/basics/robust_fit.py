@@ -58,7 +58,11 @@ def robust_fit(
     Returns:
         None where no values hold most points together, or none settle to 1e-7.
     """
-    start = _least_absolute(design, wanted, floor)
+    # Least absolute deviations, to a few parts of the scatter, where the bisquare takes over.
+    start = _weighted(design, wanted, np.ones(wanted.size))
+    for _ in range(_STARTS):
+        left = np.abs(wanted - design @ start)
+        start = _weighted(design, wanted, 1.0 / np.maximum(left, 0.1 * floor))
     # The scale is that of the start and stays: it would else creep up with every outlier that is let in.
     scale = max(scatter(wanted - design @ start), floor)
     values = _settled(design, wanted, start, scale)
@@ -74,15 +78,6 @@ def robust_fit(
     pulls = np.column_stack([np.bincount(blocks, column, count) for column in pull.T])
     moved: FloatArray = np.asarray(np.linalg.solve(bread, pulls.T).T, np.float64)
     return RobustFit(values, moved, scale, float(np.mean(~inside)))
-
-
-def _least_absolute(design: FloatArray, wanted: FloatArray, floor: float) -> FloatArray:
-    """To a few parts of the scatter, where the bisquare takes over."""
-    values = _weighted(design, wanted, np.ones(wanted.size))
-    for _ in range(_STARTS):
-        left = np.abs(wanted - design @ values)
-        values = _weighted(design, wanted, 1.0 / np.maximum(left, 0.1 * floor))
-    return values
 
 
 def _settled(design: FloatArray, wanted: FloatArray, values: FloatArray, scale: float) -> FloatArray | None:

@@ -86,9 +86,13 @@ def find_symmetries(mesh: Mesh, seed: int = 0) -> SymmetryGroup:
     Returns:
         The group with the most rotations; ``fold`` 1 and no flip if there are none.
     """
+    axes: list[FloatArray] = []
+    for axis in [*np.linalg.eigh(_moments(mesh)[1])[1].T, *np.eye(3)[::-1]]:
+        if all(abs(float(axis @ seen)) < np.cos(np.radians(0.2)) for seen in axes):
+            axes.append(np.ascontiguousarray(axis))
     tester = _Tester(mesh, seed)
     best: tuple[int, float, SymmetryGroup] | None = None
-    for axis in _axes(mesh):
+    for axis in axes:
         group = tester.group_about(axis)
         order = (1000 if group.fold == 0 else group.fold) * (1 if group.flip is None else 2)
         # Of two equal groups the earlier axis stays: principal axes come before the frame's.
@@ -166,15 +170,6 @@ def _moments(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
     total = local.sum(axis=1)
     own = np.einsum("m,mki,mkj->ij", weight, local, local)
     return centre, (own + np.einsum("m,mi,mj->ij", weight, total, total)) / 12.0
-
-
-def _axes(mesh: Mesh) -> list[FloatArray]:
-    principal = np.linalg.eigh(_moments(mesh)[1])[1].T
-    axes: list[FloatArray] = []
-    for axis in [*principal, *np.eye(3)[::-1]]:
-        if all(abs(float(axis @ seen)) < np.cos(np.radians(0.2)) for seen in axes):
-            axes.append(np.ascontiguousarray(axis))
-    return axes
 
 
 def _across(axis: FloatArray, fold: int, places: FloatArray) -> list[FloatArray]:

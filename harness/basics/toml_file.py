@@ -41,7 +41,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         WrongUse: the file cannot be read, is not TOML, or nests deeper or holds more values than ours do.
     """
     text = read_text(path, "a TOML file", MOST_TEXT, WrongUse)
-    if _longest_key(text) > _DEEPEST:
+    # The library takes quadratic time and memory for long dotted keys.
+    lines = "\n".join(line for line in text.split("\n") if not line.lstrip().startswith("#"))
+    pieces = re.split(r"[,\[\]{}=\n]", re.sub(r"\.{2,}", "", lines))
+    if max(piece.count(".") for piece in pieces) > _DEEPEST:
         raise WrongUse(f"{path} {_TOO_DEEP}")
     try:
         tree = tomllib.loads(text)
@@ -52,13 +55,6 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise WrongUse(f"{path} {_TOO_DEEP}") from error
     _require_modest(tree, path)
     return tree
-
-
-def _longest_key(text: str) -> int:
-    """Count the dots of the longest dotted key: the library takes quadratic time and memory for long ones."""
-    lines = "\n".join(line for line in text.split("\n") if not line.lstrip().startswith("#"))
-    pieces = re.split(r"[,\[\]{}=\n]", re.sub(r"\.{2,}", "", lines))
-    return max(piece.count(".") for piece in pieces)
 
 
 def _require_modest(tree: dict[str, Any], path: Path) -> None:
@@ -135,7 +131,12 @@ def _sentence(detail: ErrorDetails, model: type[BaseModel]) -> str:
     if kind == "value_error":
         return _with_value(key, detail, str(detail["ctx"]["error"]))
     if kind == "literal_error":
-        return _with_value(key, detail, _one_of(detail))
+        allowed = str(detail["ctx"]["expected"])
+        expected = f"it must be {allowed}"
+        if isinstance(detail["input"], str):
+            names = [part.strip().strip("'") for part in allowed.replace(" or ", ", ").split(",")]
+            expected = f"not known; {nearest(detail['input'], names)}"
+        return _with_value(key, detail, expected)
     return _with_value(key, detail, _lower(detail["msg"].replace("Input should", "it should")))
 
 
@@ -153,14 +154,6 @@ def _with_value(key: str, detail: ErrorDetails, expected: str) -> str:
 def _shown(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}..."
-
-
-def _one_of(detail: ErrorDetails) -> str:
-    allowed = str(detail["ctx"]["expected"])
-    names = [part.strip().strip("'") for part in allowed.replace(" or ", ", ").split(",")]
-    if isinstance(detail["input"], str):
-        return f"not known; {nearest(detail['input'], names)}"
-    return f"it must be {allowed}"
 
 
 def _dotted(location: Sequence[str | int]) -> str:

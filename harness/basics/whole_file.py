@@ -87,16 +87,14 @@ def removed_on_failure(folder: Path, names: Collection[str]) -> Iterator[None]:
         yield
     except BaseException:
         for name in names:
-            if name not in before:
-                _remove(folder / name)
+            if name in before:
+                continue
+            path = folder / name
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
         if is_new:
             with suppress(OSError):  # another program wrote there meanwhile
                 folder.rmdir()
         raise
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)

@@ -4,7 +4,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.arrays import AnyArray
 from harness.basics.clipping import is_clipped
 from harness.basics.rest_level import coarse_rest
 from harness.bench.reading import Channel, Reading
@@ -131,18 +131,15 @@ def judge(
     if not len(reached):
         return Flags(0, overload, False, True)
     onset = int(reached[0])
-    return Flags(onset, overload, _touches(risen, onset) > 1, False)
-
-
-def _at_full_scale(counts: AnyArray, full_scale: int) -> bool:
-    return bool(np.any(counts >= full_scale) or np.any(counts <= -full_scale - 1))
-
-
-def _touches(risen: FloatArray, onset: int) -> int:
-    """How often the force rises to the level of a second hit, having fallen to half of it before."""
+    # A second hit: the force rises to a level again, having fallen to half of it before.
     quiet = risen[: max(0, onset - GUARD)]
     noise = _SIGMA_PER_DEVIATION * float(np.median(np.abs(quiet))) if len(quiet) >= SHORTEST_REST else 0.0
     level = max(SECOND_HIT * float(risen.max()), _NOISE_WIDTHS * max(noise, 1.0))
     crossings = np.where(risen >= level, 1, np.where(risen < 0.5 * level, -1, 0))
     held = crossings[crossings != 0]
-    return int(np.count_nonzero(np.diff(held) > 0) + (held[0] > 0)) if len(held) else 1
+    touches = int(np.count_nonzero(np.diff(held) > 0) + (held[0] > 0)) if len(held) else 1
+    return Flags(onset, overload, touches > 1, False)
+
+
+def _at_full_scale(counts: AnyArray, full_scale: int) -> bool:
+    return bool(np.any(counts >= full_scale) or np.any(counts <= -full_scale - 1))

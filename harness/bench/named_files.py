@@ -19,7 +19,7 @@ def named_file(name: str, kind: str) -> Path:
     Raises:
         WrongUse: there is none.
     """
-    known = _known(f"{kind}s")
+    known = {path.stem: path.resolve() for path in shipped_or_here(f"{kind}s", "*.toml")}
     if name.endswith(".toml") or "/" in name:
         if not Path(name).is_file():
             raise WrongUse(
@@ -31,10 +31,6 @@ def named_file(name: str, kind: str) -> Path:
             f"there is no {kind} {name!r}; {nearest(name, known)}; or give the path of a {kind} file"
         )
     return known[name]
-
-
-def _known(folder: str) -> dict[str, Path]:
-    return {path.stem: path.resolve() for path in shipped_or_here(folder, "*.toml")}
 
 
 def shipped_or_here(folder: str, pattern: str) -> list[Path]:

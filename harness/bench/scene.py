@@ -312,7 +312,8 @@ def scene_from_options(
         "up_axis": up_axis,
     }
     if holds_objectfile(objectfile_folder(mesh, Path.cwd())):
-        _require_one(mesh, objectfile)
+        if objectfile is not None:
+            raise WrongUse(f"--object {mesh} is an ObjectFile already; leave --objectfile {objectfile} out")
         given |= {"mesh": None, "objectfile": mesh}
     elif material is None and not mesh.startswith(BUILTIN):
         raise WrongUse(
@@ -324,24 +325,15 @@ def scene_from_options(
     return _with_files_found(validate(tree, SceneFile, "the options"), Path.cwd(), "the options")
 
 
-def _require_one(mesh: str, objectfile: str | None) -> None:
-    if objectfile is not None:
-        raise WrongUse(f"--object {mesh} is an ObjectFile already; leave --objectfile {objectfile} out")
-
-
 def scene_from_json(tree: Any, where: str) -> SceneFile:
     """The scene that ``model_dump(mode="json")`` wrote, for example into a recording."""
-    return validate(tree, _model_of(tree), where)
-
-
-def _model_of(tree: Any) -> type[SceneFile]:
-    """``SceneFile`` with the tables of experiments that a scene has, so that each is checked by its model."""
     known = {row.section: row.model for row in EXPERIMENTS.values() if row.section and row.model}
     keys = set(tree) if isinstance(tree, dict) else set()
     strange = keys - set(known) - {field.alias or name for name, field in SceneFile.model_fields.items()}
-    # A key that nothing knows is answered with all that there is.
+    # The tables of experiments that the scene has are each checked by their model. If a key is unknown, all
+    # tables are named, so that the message lists every known key.
     named = tuple(name for name in known if strange or name in keys)
-    return _with_tables(tuple((name, known[name]) for name in named))
+    return validate(tree, _with_tables(tuple((name, known[name]) for name in named)), where)
 
 
 @cache

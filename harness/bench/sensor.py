@@ -166,7 +166,8 @@ def described_sensor(make: str) -> SensorDescription:
     Raises:
         WrongUse: there is none, or as ``read_sensor``.
     """
-    return _described(sensor_path(make))
+    path = sensor_path(make)
+    return _shipped(path) if path.parent == _SHIPPED else read_sensor(path)
 
 
 def read_sensor(path: Path) -> SensorDescription:
@@ -178,6 +179,7 @@ def read_sensor(path: Path) -> SensorDescription:
     """
     said = load_toml(path, SensorFile)
     figures = {name: value for name, value in said if isinstance(value, Sourced)}
+    dots = said.markers
     sensor = TactileSensor(
         said.name,
         said.image.rows,
@@ -186,7 +188,7 @@ def read_sensor(path: Path) -> SensorDescription:
         said.gel_thickness.value,
         None if said.gel_radius is None else said.gel_radius.value,
         (said.housing.x, said.housing.y),
-        _markers(said.markers),
+        None if dots is None else MarkerGrid(dots.rows, dots.columns, dots.spacing, dots.radius),
         said.shadow.casts,
     )
     _check(sensor, path)
@@ -197,10 +199,6 @@ def read_sensor(path: Path) -> SensorDescription:
         {name: figure.source for name, figure in figures.items()},
         tuple(name for name, figure in figures.items() if figure.basis == "assumed"),
     )
-
-
-def _described(path: Path) -> SensorDescription:
-    return _shipped(path) if path.parent == _SHIPPED else read_sensor(path)
 
 
 @cache
@@ -215,10 +213,6 @@ def _beside(path: Path, calibration: str | None) -> str | None:
         return None
     beside = path.parent / calibration
     return str(real_path(beside)) if beside.is_file() else calibration
-
-
-def _markers(said: MarkerFigure | None) -> MarkerGrid | None:
-    return None if said is None else MarkerGrid(said.rows, said.columns, said.spacing, said.radius)
 
 
 def _check(sensor: TactileSensor, path: Path) -> None:

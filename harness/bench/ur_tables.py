@@ -48,11 +48,6 @@ def arm_table(model: str) -> ArmTable:
     return ARM_TABLES[model]
 
 
-def _tensors(rows: list[tuple[float, float, float, float, float, float]]) -> FloatArray:
-    """``(n, 3, 3)`` of rows (ixx, ixy, ixz, iyy, iyz, izz)."""
-    return np.array([[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] for xx, xy, xz, yy, yz, zz in rows])
-
-
 def _table(
     d: tuple[float, float, float, float],
     a: tuple[float, float],
@@ -64,13 +59,14 @@ def _table(
 ) -> ArmTable:
     """A table of the numbers that are not the same on every arm: d1, d4, d5, d6 and a2, a3."""
     d1, d4, d5, d6 = d
+    tensors = [[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] for xx, xy, xz, yy, yz, zz in inertias]
     turns = 2 * np.pi * np.array([1.0, 1.0, 0.5, 1.0, 1.0, 1.0])
     return ArmTable(
         d=(d1, 0.0, 0.0, d4, d5, d6),
         a=(0.0, a[0], a[1], 0.0, 0.0, 0.0),
         masses=read_only(np.array(masses)),
         centres=read_only(np.array(centres)),
-        inertias=read_only(_tensors(inertias)),
+        inertias=read_only(np.array(tensors)),
         joint_range=read_only(np.stack([-turns, turns])),
         joint_speeds=read_only(np.deg2rad(speeds_deg)),
         joint_torques=read_only(np.array(torques)),

@@ -147,9 +147,13 @@ def add_report(
     scored = replace(scored, warnings=(*scored.warnings, *comparison.notes))
     page = (experiment.report or draw)(scored, comparison, health, folder / "report")
     write_arrays(folder / OBSERVED, comparison.arrays(), compressed=True)
+    plan = as_json(comparison.plan)
+    for step in plan["ran"]:
+        step["seconds"] = comparison.evaluation.seconds.get(step["effect"])
+        step["calls"] = comparison.evaluation.calls.get(step["effect"], 0)
     result = {
         **written.result,
-        "plan": plan_json(comparison),
+        "plan": plan,
         "observed": comparison.observed(),
         "agreement": agreement.as_json(),
         "warnings": [*written.result["warnings"], *comparison.notes],
@@ -174,16 +178,6 @@ def common(experiment: Experiment, scored: Scored) -> dict[str, Any]:
         "recording": str(recording.folder),
         "report": None,
     }
-
-
-def plan_json(comparison: Comparison) -> dict[str, Any]:
-    """The effects that ran, with what each took, and those that did not."""
-    described = as_json(comparison.plan)
-    evaluation = comparison.evaluation
-    for step in described["ran"]:
-        step["seconds"] = evaluation.seconds.get(step["effect"])
-        step["calls"] = evaluation.calls.get(step["effect"], 0)
-    return described
 
 
 def levels_of_result(experiment: Experiment, folder: Path) -> dict[str, Level]:

@@ -63,7 +63,14 @@ def begin(
             'scale = "hidden" in the scene): give its scale, or find it first with touchstone run '
             "scale-estimation"
         )
-    mock = _mock(procedure, station, gap, bench)
+    mock = None  # how the mocked bench is started; None at a real one, which has no such options
+    if station.mock is not None:
+        gap = lasting_name(gap or procedure.gap or station.mock.gap)
+        mock = {"gap": gap, "bench": bench or IN_PROCESS}
+    else:
+        for option, value in (("--gap", gap), ("--bench", bench)):
+            if value is not None:
+                raise WrongUse(f"{option} is for a mocked bench; this station is a real one: leave it out")
     if procedure.observe is not None and scene.observe == SceneFile.model_fields["observe"].default:
         scene = scene.model_copy(update={"observe": procedure.observe})
     known = known_object(scene)
@@ -112,15 +119,3 @@ def require_reachable(procedure: Procedure, scene: SceneFile, mesh: Mesh) -> Non
             f"an error of {1e3 * wanted:g} mm cannot be reached: this run can state "
             f"{1e3 * bound.error:.2g} mm at best, {bound.reason}; allow more with --error, {bound.advice}"
         )
-
-
-def _mock(
-    procedure: Procedure, station: Station, gap: str | None, bench: str | None
-) -> dict[str, str] | None:
-    """How the mocked bench is started; None at a real one, which has no such options."""
-    if station.mock is None:
-        for option, value in (("--gap", gap), ("--bench", bench)):
-            if value is not None:
-                raise WrongUse(f"{option} is for a mocked bench; this station is a real one: leave it out")
-        return None
-    return {"gap": lasting_name(gap or procedure.gap or station.mock.gap), "bench": bench or IN_PROCESS}

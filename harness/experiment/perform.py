@@ -140,17 +140,12 @@ def perform_on(
             answering.read(record)
     told = _Reading(progress, recording, answering)
     complete = perform(procedure.performer(run, helpers), bench, recording, bench.arm.stop, told)
-    return Performed(complete, health_of(bench), answering, told.last)
-
-
-def health_of(bench: Bench) -> dict[str, Health]:
-    """How each instrument did, by its name."""
-    found = {"arm": bench.arm.health(), "gel": bench.gel.health()}
+    health = {"arm": bench.arm.health(), "gel": bench.gel.health()}
     if bench.hammer is not None:
-        found["hammer"] = bench.hammer.health()
+        health["hammer"] = bench.hammer.health()
     if bench.microphone is not None:
-        found["microphone"] = bench.microphone.health()
-    return found
+        health["microphone"] = bench.microphone.health()
+    return Performed(complete, health, answering, told.last)
 
 
 class _Reading:

@@ -301,19 +301,12 @@ def _channel(
     seen = where.copy()
     seen[where] = measured
     wrong = mistaken_light(live - design @ fit.values, seen, TUKEY * fit.scale)
-    return _Channel(
-        values, moved, _biased(wrong, x, values[0], kind), fit.scale, pixels, saturated, fit.outliers
-    )
-
-
-def _biased(wrong: float, light: FloatArray, gain: float, kind: ExposureKind) -> FloatArray:
-    """``(2,)`` what gain and offset are moved by if a variance of live light is the simulation's doing.
-
-    A line turns about the middle of its pixels: with a gain too small goes an offset too large.
-    """
-    middle = float(light.mean()) if kind == "gain-offset" else 0.0
-    loss = wrong / gain / float(np.mean((light - middle) ** 2))
-    return np.array([loss, loss * middle])
+    # Light that the simulation gets wrong moves gain and offset. The fitted line turns about the mean of its
+    # pixels: a gain that is too small comes with an offset that is too large.
+    middle = float(x.mean()) if kind == "gain-offset" else 0.0
+    loss = wrong / values[0] / float(np.mean((x - middle) ** 2))
+    bias = np.array([loss, loss * middle])
+    return _Channel(values, moved, bias, fit.scale, pixels, saturated, fit.outliers)
 
 
 def _require_enough(levels: ByteArray, measured: BoolArray, blocks: AnyArray, name: str) -> None:

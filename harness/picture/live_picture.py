@@ -70,7 +70,11 @@ def compare_live(
         DataRefused: as of ``fit_exposure``, of ``mask_by_background`` and of ``mask_by_colours``.
     """
     begun = time.perf_counter()
-    _require_size(live, image)
+    if live.shape != image.colour.shape:
+        raise DataRefused(
+            f"the live picture is {live.shape[1]} x {live.shape[0]} pixels and the simulated one "
+            f"{image.alpha.shape[1]} x {image.alpha.shape[0]}; give the camera that took it"
+        )
     silhouette = image.alpha >= SILHOUETTE
     inside = ndimage.binary_erosion(image.alpha >= _WHOLE, iterations=_EDGE)
     light = image.colour / np.maximum(image.alpha, SILHOUETTE)[..., None]
@@ -98,14 +102,6 @@ def compare_live(
         unfitted=unfitted,
         seconds={"fit": fitted_at - begun, "mask": masked_at - fitted_at, "difference": ended - masked_at},
     )
-
-
-def _require_size(live: ByteArray, image: LinearImage) -> None:
-    if live.shape != image.colour.shape:
-        raise DataRefused(
-            f"the live picture is {live.shape[1]} x {live.shape[0]} pixels and the simulated one "
-            f"{image.alpha.shape[1]} x {image.alpha.shape[0]}; give the camera that took it"
-        )
 
 
 def _before(colour: FloatArray, alpha: FloatArray, behind: FloatArray) -> ByteArray:

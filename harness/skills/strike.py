@@ -172,27 +172,25 @@ def strike(
             bench.arm.set_digital_output(output, False)
 
     there = translation(moved * motion.axis) @ motion.base_from_firing
-    if guard is not None and _blocked(motion, there, bench, guard):
-        bench.arm.move_line(motion.base_from_ready, speeds.approach, speeds.acceleration)
-        return ()
+    if guard is not None:
+        way = float((there[:3, 3] - motion.base_from_ready[:3, 3]) @ motion.axis)
+        bench.arm.zero_force()
+        if meets(bench, motion.axis, way, guard):
+            _LOG.warning("no strike: the hammer or what carries it met something before the place to strike")
+            bench.arm.move_line(motion.base_from_ready, speeds.approach, speeds.acceleration)
+            return ()
     bench.arm.move_line(there, speeds.approach, speeds.acceleration)
     try:
         bench.mark(step, STRIKE)
-        pose = _pose(bench)
+        state = bench.arm.state()
+        flange = state.base_from_flange
+        value = np.concatenate([flange[:3, 3], quaternion_from_rotation(flange[:3, :3])])
+        channel = Channel(POSE, "m, 1", (7,), "float64", "base")
+        pose = Reading(channel, np.array([state.time]), value[None])
         heard = _captured(bench, fire)
     finally:
         bench.arm.move_line(motion.base_from_ready, speeds.approach, speeds.acceleration)
     return (pose, *heard)
-
-
-def _blocked(motion: StrikeMotion, there: FloatArray, bench: Bench, guard: SearchGuard) -> bool:
-    """Whether something is on the way to where the striker is fired; the arm is then before it."""
-    way = float((there[:3, 3] - motion.base_from_ready[:3, 3]) @ motion.axis)
-    bench.arm.zero_force()
-    met = meets(bench, motion.axis, way, guard)
-    if met:
-        _LOG.warning("no strike: the hammer or what carries it met something before the place to strike")
-    return met
 
 
 def strike_by_hand(step: int, bench: Bench, ask: Ask | None) -> tuple[Reading, ...]:
@@ -249,13 +247,6 @@ def _captured(bench: Bench, fire: Callable[[], None]) -> tuple[Reading, ...]:
 def _capture(bench: Bench, fire: Callable[[], None], timeout: float) -> tuple[Reading, ...]:
     assert bench.hammer is not None
     return capture(bench.hammer, bench.microphone, fire, BEFORE, AFTER, timeout)
-
-
-def _pose(bench: Bench) -> Reading:
-    state = bench.arm.state()
-    pose = state.base_from_flange
-    value = np.concatenate([pose[:3, 3], quaternion_from_rotation(pose[:3, :3])])
-    return Reading(Channel(POSE, "m, 1", (7,), "float64", "base"), np.array([state.time]), value[None])
 
 
 def meets(bench: Bench, axis: FloatArray, travel: float, guard: SearchGuard) -> bool:

@@ -23,7 +23,12 @@ class OwnedFolder:
         parent = parent or Path(tempfile.gettempdir())
         _remove_ownerless(prefix, parent)
         self.path = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
-        self._held: int | None = _hold(self.path)
+        # The lock on this descriptor shows that the owner lives; no child inherits it.
+        part = self.path / f".{_OWNER}.part"
+        self._held: int | None = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        fcntl.flock(self._held, fcntl.LOCK_EX)
+        # Renamed once locked: a folder with an owner's lock that is free has lost its owner.
+        part.rename(self.path / _OWNER)
 
     def close(self) -> None:
         """Remove the folder with all that is in it; may be called twice."""
@@ -31,16 +36,6 @@ class OwnedFolder:
         if held is not None:
             shutil.rmtree(self.path, ignore_errors=True)
             os.close(held)
-
-
-def _hold(folder: Path) -> int:
-    """The descriptor whose lock says that the owner lives; no child inherits it."""
-    part = folder / f".{_OWNER}.part"
-    held = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-    fcntl.flock(held, fcntl.LOCK_EX)
-    # Renamed once locked: a folder with an owner's lock that is free has lost its owner.
-    part.rename(folder / _OWNER)
-    return held
 
 
 def _remove_ownerless(prefix: str, parent: Path) -> None:
