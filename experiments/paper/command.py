@@ -1,16 +1,12 @@
 """``touchstone tables rendering``: the paper's tables 1 and 2, with its 1.0 trained and measured here."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from harness.commands import options
 from harness.commands.output import CONSOLE, emit, share_progress, warn
-
-if TYPE_CHECKING:
-    from experiments.paper.rendering import Sense
-    from harness.objectfile.file import ObjectFile
 
 
 def rendering(
@@ -44,7 +40,7 @@ def rendering(
     Try: touchstone tables rendering --object mug
     """
     options.require_folders(("--out", out))
-    from experiments.paper.rendering import RenderingWork
+    from experiments.paper.rendering import SENSES, RenderingWork
     from experiments.paper.rendering_table import (
         RenderingCounts,
         as_csv,
@@ -53,11 +49,22 @@ def rendering(
         plain_rendering,
         quoted_rows,
     )
+    from harness.basics.errors import WrongUse
+    from harness.basics.files.named_file import nearest
     from harness.basics.store import Store
     from harness.basics.whole_file import write_text_whole
+    from harness.bench.scene_objectfile import objectfile_folder, require_objectfile
+    from harness.objectfile.file import ObjectFile
 
-    senses, counts = _senses(sense), RenderingCounts(views, strikes, presses)
-    opened = [_opened(name) for name in object_ or ["mug"]]
+    for name in sense or []:
+        if name not in SENSES:
+            raise WrongUse(f"--sense {name} is none; {nearest(name, SENSES)}")
+    senses = [each for each in SENSES if not sense or each in sense]  # in the tables' order
+    counts, opened = RenderingCounts(views, strikes, presses), []
+    for name in object_ or ["mug"]:
+        folder = objectfile_folder(name, Path.cwd())
+        require_objectfile(folder, f"--object {name}")
+        opened.append(ObjectFile.open(folder))
     rows = quoted_rows()
     with share_progress(quiet=json) as report:
         work = RenderingWork(Store(out / "cells"), report)
@@ -75,28 +82,3 @@ def rendering(
     print_tables(rows, machine_text())
     CONSOLE.print(f"rows: {out / 'rows.csv'}", markup=False)
     return 0
-
-
-def _opened(name: str) -> "ObjectFile":
-    from harness.bench.scene_objectfile import objectfile_folder, require_objectfile
-    from harness.objectfile.file import ObjectFile
-
-    folder = objectfile_folder(name, Path.cwd())
-    require_objectfile(folder, f"--object {name}")
-    return ObjectFile.open(folder)
-
-
-def _senses(wanted: list[str] | None) -> "list[Sense]":
-    """In the tables' order.
-
-    Raises:
-        WrongUse: a sense that there is not.
-    """
-    from experiments.paper.rendering import SENSES
-    from harness.basics.errors import WrongUse
-    from harness.basics.files.named_file import nearest
-
-    for name in wanted or []:
-        if name not in SENSES:
-            raise WrongUse(f"--sense {name} is none; {nearest(name, SENSES)}")
-    return [each for each in SENSES if not wanted or each in wanted]

@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array
+from scipy.sparse import coo_array
 from scipy.sparse.linalg import eigsh
 from scipy.spatial import cKDTree
 
@@ -112,7 +112,13 @@ def hexahedral_modes(
     cubes, origin, side = voxel_cubes(mesh, cells)
     corners = cubes[:, None] + _CORNERS
     places, numbers = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    stiffness, mass = _assembled(numbers.reshape(len(cubes), 8), material, side)
+    # Unknown ``3 n + axis`` is a node's.
+    of_cube = cube_matrices(material, side)
+    unknowns = (3 * numbers.reshape(len(cubes), 8)[:, :, None] + np.arange(3)).reshape(len(cubes), 24)
+    rows, columns = np.repeat(unknowns, 24, axis=1).ravel(), np.tile(unknowns, (1, 24)).ravel()
+    size = 3 * (int(numbers.max()) + 1)
+    both = (np.tile(each.ravel(), len(cubes)) for each in of_cube)
+    stiffness, mass = (coo_array((values, (rows, columns)), (size, size)).tocsc() for values in both)
     wanted = min(most + _RIGID, stiffness.shape[0] - 2)
     # A shift below zero: the body is free, and its stiffness alone has no inverse.
     shift = -((2.0 * np.pi * 0.02 * limit) ** 2)
@@ -128,18 +134,6 @@ def hexahedral_modes(
     )
 
 
-def _assembled(numbers: IntArray, material: Material, side: float) -> tuple[csc_array, csc_array]:
-    """Stiffness and mass of ``(c, 8)`` cubes; unknown ``3 n + axis`` is a node's."""
-    stiffness, mass = cube_matrices(material, side)
-    unknowns = (3 * numbers[:, :, None] + np.arange(3)).reshape(len(numbers), 24)
-    rows = np.repeat(unknowns, 24, axis=1).ravel()
-    columns = np.tile(unknowns, (1, 24)).ravel()
-    size = 3 * (int(numbers.max()) + 1)
-    both = (np.tile(each.ravel(), len(numbers)) for each in (stiffness, mass))
-    one, other = (coo_array((values, (rows, columns)), (size, size)).tocsc() for values in both)
-    return one, other
-
-
 def cube_matrices(material: Material, side: float) -> tuple[FloatArray, FloatArray]:
     """``(24, 24)`` stiffness in N/m and consistent mass in kg of one cube, nodes in binary order.
 
@@ -147,43 +141,28 @@ def cube_matrices(material: Material, side: float) -> tuple[FloatArray, FloatArr
         material: isotropic.
         side: m.
     """
-    elastic = _elastic(material)
-    stiffness, mass = np.zeros((24, 24)), np.zeros((24, 24))
-    weight = (0.5 * side) ** 3
-    for at in product((-1.0 / np.sqrt(3.0), 1.0 / np.sqrt(3.0)), repeat=3):
-        values, slopes = _functions(np.array(at))
-        strain = _strain(slopes * 2.0 / side)
-        stiffness += weight * strain.T @ elastic @ strain
-        mass += weight * material.density * np.kron(np.outer(values, values), np.eye(3))
-    return stiffness, mass
-
-
-def _functions(at: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """``(8,)`` trilinear functions and ``(8, 3)`` their slopes at a place of -1 .. 1."""
-    signs = 2.0 * _CORNERS - 1.0
-    parts = 0.5 * (1.0 + signs * at)
-    slopes = np.empty((8, 3))
-    for axis in range(3):
-        others = np.delete(parts, axis, axis=1).prod(axis=1)
-        slopes[:, axis] = 0.5 * signs[:, axis] * others
-    return parts.prod(axis=1), slopes
-
-
-def _strain(slopes: FloatArray) -> FloatArray:
-    """``(6, 24)``: strains xx yy zz yz zx xy of the nodes' motion."""
-    found = np.zeros((6, 24))
-    for row, (first, second) in enumerate(((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))):
-        found[row, first::3] += slopes[:, second]
-        if first != second:
-            found[row, second::3] += slopes[:, first]
-    return found
-
-
-def _elastic(material: Material) -> FloatArray:
-    """``(6, 6)`` Pa: Hooke's law."""
+    # Hooke's law in Pa.
     poisson = material.poisson
     first = material.young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
     shear = 0.5 * material.young / (1.0 + poisson)
-    found = np.diag([2.0 * shear] * 3 + [shear] * 3)
-    found[:3, :3] += first
-    return found
+    elastic = np.diag([2.0 * shear] * 3 + [shear] * 3)
+    elastic[:3, :3] += first
+    stiffness, mass = np.zeros((24, 24)), np.zeros((24, 24))
+    weight = (0.5 * side) ** 3
+    signs = 2.0 * _CORNERS - 1.0
+    for at in product((-1.0 / np.sqrt(3.0), 1.0 / np.sqrt(3.0)), repeat=3):
+        # The trilinear functions there, ``(8,)``, and their slopes in a cube of -1 .. 1, ``(8, 3)``.
+        parts = 0.5 * (1.0 + signs * np.array(at))
+        values, slopes = parts.prod(axis=1), np.empty((8, 3))
+        for axis in range(3):
+            slopes[:, axis] = 0.5 * signs[:, axis] * np.delete(parts, axis, axis=1).prod(axis=1)
+        slopes = slopes * 2.0 / side
+        # Strains xx yy zz yz zx xy of the nodes' motion.
+        strain = np.zeros((6, 24))
+        for row, (one, other) in enumerate(((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))):
+            strain[row, one::3] += slopes[:, other]
+            if one != other:
+                strain[row, other::3] += slopes[:, one]
+        stiffness += weight * strain.T @ elastic @ strain
+        mass += weight * material.density * np.kron(np.outer(values, values), np.eye(3))
+    return stiffness, mass

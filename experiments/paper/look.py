@@ -119,46 +119,28 @@ def view_bench(of: ObjectFile, views: int, work: RenderingWork) -> ViewBench:
     """The views of an object.
 
     Raises:
-        DataRefused: its colours are not known here: it was not built in.
+        DataRefused: its colours come from a file, which an ObjectFile does not hold.
     """
     work.report("vision: drawing the reference", 0.0)
-    lit = LitObject(appearance_of(origin_of(of), None, edge=_edge(of)))
-    held_out = held_out_pictures(lit.appearance.mesh, views, SIZE, SIZE, _seed(of), DISTANCE)
-    key = digest(["rendering reference", SAMPLES, lit.appearance.mesh.vertices, views, _seed(of)])
+    origins = [source.origin for source in of.description.provenance.sources]
+    builtin = [origin for origin in origins if origin.startswith(BUILTIN)]
+    if not builtin:
+        raise DataRefused(
+            f"{of.description.name} came from {', '.join(origins) or 'nowhere'}, whose colours its "
+            "ObjectFile does not hold, so that no reference can be drawn; take one that is built in, as mug"
+        )
+    # The mesh as the object was built, and views that the ObjectFile's own networks did not learn from.
+    vision = of.description.vision
+    profile = None if vision is None else vision.provenance.settings.get("profile")
+    seed = 0 if vision is None else vision.provenance.seeds.get("vision", 0)
+    lit = LitObject(appearance_of(builtin[0], None, edge=vision_profile(str(profile or "shipped")).edge))
+    held_out = held_out_pictures(lit.appearance.mesh, views, SIZE, SIZE, seed, DISTANCE)
+    key = digest(["rendering reference", SAMPLES, lit.appearance.mesh.vertices, views, seed])
     stored = work.store.get(key)
     if not isinstance(stored, np.ndarray):
         stored = np.stack([shown(each) for each in reference_pictures(lit, held_out, SAMPLES)])
         work.store.put(key, stored)
     return ViewBench(lit, held_out, tuple(stored))
-
-
-def origin_of(of: ObjectFile) -> str:
-    """``builtin:NAME``, where an object's colours come from.
-
-    Raises:
-        DataRefused: they come from a file, which an ObjectFile does not hold.
-    """
-    origins = [source.origin for source in of.description.provenance.sources]
-    found = [origin for origin in origins if origin.startswith(BUILTIN)]
-    if not found:
-        raise DataRefused(
-            f"{of.description.name} came from {', '.join(origins) or 'nowhere'}, whose colours its "
-            "ObjectFile does not hold, so that no reference can be drawn; take one that is built in, as mug"
-        )
-    return found[0]
-
-
-def _edge(of: ObjectFile) -> float:
-    """M between vertices of the look's mesh, as the object was built."""
-    vision = of.description.vision
-    profile = None if vision is None else vision.provenance.settings.get("profile")
-    return vision_profile(str(profile or "shipped")).edge
-
-
-def _seed(of: ObjectFile) -> int:
-    """Of the views: those that the ObjectFile's own networks did not learn from."""
-    vision = of.description.vision
-    return 0 if vision is None else vision.provenance.seeds.get("vision", 0)
 
 
 FIELD_FILE = "vision_field.onnx"

@@ -108,12 +108,6 @@ class TorchMissing(Exception):
     """A baseline has to be trained, and torch is not installed; its row of the table says so."""
 
 
-def require_torch(what: str) -> None:
-    """Raise ``TorchMissing`` where torch is not installed."""
-    if any(find_spec(name) is None for name in ("torch", "onnxscript")):
-        raise TorchMissing(f"{what} has to be trained, which needs torch: pip install '.[author]'")
-
-
 def stored_graph(
     store: Store, identity: tuple[object, ...], what: str, train: Callable[[], bytes], torch: bool = True
 ) -> tuple[bytes, float]:
@@ -136,8 +130,8 @@ def stored_graph(
     stored = store.get(key)
     if isinstance(stored, Mapping):
         return stored["graph"].tobytes(), float(stored["seconds"])
-    if torch:
-        require_torch(what)
+    if torch and any(find_spec(name) is None for name in ("torch", "onnxscript")):
+        raise TorchMissing(f"{what} has to be trained, which needs torch: pip install '.[author]'")
     begun = time.process_time()
     data = train()
     seconds = time.process_time() - begun

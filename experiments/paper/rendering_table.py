@@ -138,20 +138,16 @@ def _measured(
             strikes = strike_bench(mesh, of.description.material.material(), counts.strikes, work)
             yield strikes, sound_methods(strikes, work)
         case "touch":
-            codes = _codes_of(of)
+            codes: NodeSearch | None = None
+            entry = of.description.touch
+            if entry is not None and entry.codes is not None:
+                maps = open_touch(of, "codes").maps
+                assert isinstance(maps, CodeMaps)
+                codes = maps.nodes
             presses = touch_bench(mesh, counts.presses, "any", work, codes)
             yield presses, touch_methods(presses, of, work)
             upright = touch_bench(mesh, counts.presses, "upright", work, codes)
             yield upright, [untouched(upright, UPRIGHT), first_touch(upright, work, UPRIGHT)]
-
-
-def _codes_of(of: ObjectFile) -> NodeSearch | None:
-    entry = of.description.touch
-    if entry is None or entry.codes is None:
-        return None
-    maps = open_touch(of, "codes").maps
-    assert isinstance(maps, CodeMaps)
-    return maps.nodes
 
 
 def row_of(name: str, queries: int, sense: Sense, found: MeasuredMethod) -> RenderingRow:
@@ -252,7 +248,12 @@ def _second(name: str, rows: Sequence[RenderingRow]) -> None:
         drawn.add_column(f"{sense} {_METRICS[metric][0]}")
     for column in _columns(rows):
         found = {row.sense: row.metrics for row in rows if row.column == column}
-        drawn.add_row(column, *(_value(found.get(sense, {}).get(metric), metric) for sense, metric in keys))
+        cells = []
+        for sense, metric in keys:
+            interval = found.get(sense, {}).get(metric)
+            _, factor, shape = _METRICS[metric]
+            cells.append("" if interval is None else format(interval.value * factor, shape))
+        drawn.add_row(column, *cells)
     ANSWERS.print(drawn)
 
 
@@ -273,11 +274,6 @@ def _time(seconds: tuple[float, float, float] | None) -> str:
         return ""
     middle, low, high = (each * _MILLI for each in seconds)
     return f"{middle:.3g}" if np.isclose(low, high) else f"{middle:.3g} ({low:.3g} to {high:.3g})"
-
-
-def _value(interval: Interval | None, metric: str) -> str:
-    _, factor, shape = _METRICS[metric]
-    return "" if interval is None else format(interval.value * factor, shape)
 
 
 def _interval(interval: Interval | None, metric: str) -> str:

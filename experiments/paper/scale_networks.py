@@ -15,7 +15,7 @@ from scipy.fft import rfft, rfftfreq
 
 from experiments.scale_estimation.unseen import contact_set
 from experiments.scale_estimation.unseen.network import reading_input
-from harness.basics.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray
 from harness.basics.errors import DataRefused, FitRefused
 from harness.objectfile.entries import Tensor
 from harness.objectfile.runtime import Network
@@ -74,15 +74,11 @@ def crop_of(picture: ByteArray, mask: BoolArray, focal_px: float) -> FloatArray:
     shades = np.where(mask[..., None], picture / 255.0, 0.0)
     # A margin of the crop's own size: the object's middle lies in the picture, so no crop reaches beyond.
     padded = np.pad(shades, ((side, side), (side, side), (0, 0)))
-    top, left = (side + _start(np.flatnonzero(mask.any(axis=axis)), side) for axis in (1, 0))
+    covered = [np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0)]
+    top, left = (side + round(0.5 * (int(one[0]) + int(one[-1]) + 1 - side)) for one in covered)
     window = padded[top : top + side, left : left + side]
     small = cv2.resize(window, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
     return np.ascontiguousarray(small.transpose(2, 0, 1))
-
-
-def _start(covered: IntArray, side: int) -> int:
-    """Where a crop begins that has the covered rows or columns in its middle."""
-    return round(0.5 * (int(covered[0]) + int(covered[-1]) + 1 - side))
 
 
 def spectrogram_of(response: FloatArray, rate: float, band: tuple[float, float]) -> FloatArray:

@@ -40,7 +40,12 @@ _COLOUR = (0.3, 0.95)
 def pictures(seed: int, count: int, number: int) -> list[SampleRow]:
     """So many crops of one shape: sizes, places, cameras, lamps and albedos drawn anew for each."""
     mesh = shape_of(number, seed).surface
-    lit, random = _white(mesh), np.random.default_rng((seed, number, _STREAMS["picture"]))
+    # A shape one long that reflects all light; matt, so that its colour is a factor.
+    faces = len(mesh.faces)
+    tints, places = np.ones((faces, 3, 3)), np.zeros((faces, 3, 2))
+    textures = np.full(faces, NO_TEXTURE)
+    lit = LitObject(Appearance(mesh, smooth_normals(mesh), tints, places, textures))
+    random = np.random.default_rng((seed, number, _STREAMS["picture"]))
     rows: list[SampleRow] = []
     for _ in range(count):
         size = draw_size(random)
@@ -83,22 +88,25 @@ PAPER_MAKERS: dict[str, Callable[[int, int, int], list[SampleRow]]] = {
 }
 
 
-def _white(mesh: Mesh) -> LitObject:
-    """A shape one long that reflects all light; matt, so that its colour is a factor."""
-    count = len(mesh.faces)
-    tints, places = np.ones((count, 3, 3)), np.zeros((count, 3, 2))
-    return LitObject(Appearance(mesh, smooth_normals(mesh), tints, places, np.full(count, NO_TEXTURE)))
-
-
 def _crop(lit: LitObject, mesh: Mesh, size: float, random: np.random.Generator) -> FloatArray:
     """``(3, SIDE, SIDE)`` as ``crop_of`` makes them, drawn at that size."""
     yaw = random.uniform(0.0, 2.0 * np.pi)
     turn = np.array([[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
     base_from_object = transform(turn, PLACE + np.append(PUT * random.standard_normal(2), 0.0))
     camera = crop_camera(mesh, size, base_from_object, drawn_camera(random))
-    lamps = _lamps(camera, random)
+    # A lamp about the line of sight, and weaker light along it and from above.
+    back = -camera.forward
+    slant = np.tan(min(abs(_SLANT * random.standard_normal()), 1.4))
+    across = np.cross(back, random.standard_normal(3))
+    aside = back + slant * (across / np.linalg.norm(across))
+    strengths = np.pi * np.array([random.uniform(*_BRIGHTNESS), *random.uniform(*_FILL, 2)])
+    lamps = [
+        DirectionalLight(direction, float(strength))
+        for direction, strength in zip((aside, back, np.array([0.0, 0.0, 1.0])), strengths, strict=True)
+    ]
     image = lit.render(camera, lamps, _RAYS, shadow=bool(random.random() < 0.5)).image
-    albedo = linear_from_srgb(_colour(random))
+    grey = random.uniform(*_COLOUR)  # most colours are pale
+    albedo = linear_from_srgb(np.clip(grey + 0.12 * random.standard_normal(3), 0.05, 1.0))
     covered = np.maximum(image.alpha, 1e-9)[..., None]
     shades = srgb_from_linear(np.clip(image.colour * albedo / covered, 0.0, 1.0))
     return np.asarray((shades * image.alpha[..., None]).transpose(2, 0, 1))
@@ -122,26 +130,3 @@ def crop_camera(
     seen = focal * corners[:, :2] / corners[:, 2:]
     x, y = 0.5 * (SIDE - seen.min(axis=0) - seen.max(axis=0))
     return Pinhole(SIDE, SIDE, focal, (float(x), float(y)), object_from_camera)
-
-
-def _lamps(camera: Pinhole, random: np.random.Generator) -> list[DirectionalLight]:
-    """A lamp about the line of sight, and weaker light along it and from above."""
-    back = -camera.forward
-    aside = back + np.tan(min(abs(_SLANT * random.standard_normal()), 1.4)) * _across(back, random)
-    strengths = np.pi * np.array([random.uniform(*_BRIGHTNESS), *random.uniform(*_FILL, 2)])
-    return [
-        DirectionalLight(direction, float(strength))
-        for direction, strength in zip((aside, back, np.array([0.0, 0.0, 1.0])), strengths, strict=True)
-    ]
-
-
-def _across(direction: FloatArray, random: np.random.Generator) -> FloatArray:
-    """``(3,)`` unit, perpendicular."""
-    drawn = np.cross(direction, random.standard_normal(3))
-    return np.asarray(drawn / np.linalg.norm(drawn))
-
-
-def _colour(random: np.random.Generator) -> FloatArray:
-    """``(3,)`` sRGB, most of them pale."""
-    grey = random.uniform(*_COLOUR)
-    return np.asarray(np.clip(grey + 0.12 * random.standard_normal(3), 0.05, 1.0))

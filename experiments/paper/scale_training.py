@@ -111,7 +111,11 @@ def fitted_paper(sense: str, samples: SizeSamples, epochs: int, seed: int) -> Re
     for epoch in range(epochs):
         began, total = time.perf_counter(), 0.0
         for rows in torch.randperm(len(targets), generator=draw).split(BATCH):
-            given = _varied(sense, [value[rows] for value in inputs], draw)
+            given = [value[rows] for value in inputs]
+            if sense == "picture":  # half of them mirrored: a mirrored object is as large
+                (crop,) = given
+                mirrored = torch.rand((len(crop), 1, 1, 1), generator=draw) < 0.5
+                given = [torch.where(mirrored, crop.flip(3), crop)]
             loss = nn.functional.l1_loss(module(*given), targets[rows])
             adam.zero_grad()
             loss.backward()
@@ -124,15 +128,6 @@ def fitted_paper(sense: str, samples: SizeSamples, epochs: int, seed: int) -> Re
         )
     module.eval()
     return module
-
-
-def _varied(sense: str, given: list[Tensor], draw: torch.Generator) -> list[Tensor]:
-    """Half of the pictures mirrored: a mirrored object is as large."""
-    if sense != "picture":
-        return given
-    (crop,) = given
-    mirrored = torch.rand((len(crop), 1, 1, 1), generator=draw) < 0.5
-    return [torch.where(mirrored, crop.flip(3), crop)]
 
 
 def answered_sizes(module: nn.Module, samples: SizeSamples) -> FloatArray:

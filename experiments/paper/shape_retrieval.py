@@ -207,17 +207,14 @@ def fit_pose(
         silhouette: silhouette of the picture; None without one.
     """
     few = samples.points[np.random.default_rng(0).permutation(len(samples.points))[:_RANKED_CONTACTS]]
-    starts = sorted(_start_poses(shape, samples), key=lambda start: _distance_cost(start, few))
-    refined = [_refine(start, samples) for start in starts[:REFINED]]
-    return min((_with_cost(one, samples, evidence, silhouette) for one in refined), key=lambda one: one.cost)
-
-
-def _start_poses(shape: LibraryShape, samples: ContactSamples) -> list[PlacedShape]:
     low, high = samples.points.min(axis=0), samples.points.max(axis=0)
     reach = max(float(np.max([*(high - low)[:2], high[2]])), _LEAST)
     middle = 0.5 * (low + high)[:2]
     yaws = np.arange(YAWS) * 2.0 * np.pi / YAWS
-    return [PlacedShape(shape, size * reach, float(yaw), middle, np.inf) for size in SIZES for yaw in yaws]
+    starts = [PlacedShape(shape, size * reach, float(yaw), middle, np.inf) for size in SIZES for yaw in yaws]
+    starts.sort(key=lambda start: _distance_cost(start, few))
+    refined = [_refine(start, samples) for start in starts[:REFINED]]
+    return min((_with_cost(one, samples, evidence, silhouette) for one in refined), key=lambda one: one.cost)
 
 
 def _distance_cost(at: PlacedShape, points: FloatArray) -> float:
@@ -268,23 +265,19 @@ def _with_cost(
     depths = [sensor_depth(replace(evidence, touches=(one,)), own).max() for one in evidence.distinct]
     cost += float(np.log1p((np.maximum(depths, 0.0) / _FREE) ** 2).mean())
     if silhouette is not None:
-        cost += _picture_cost(own, silhouette)
+        # Surface points outside the silhouette, and its pixels without points.
+        outside = float(np.log1p((np.maximum(silhouette.outside_pixels(own), 0.0) / _PIXELS) ** 2).mean())
+        rows, columns = np.nonzero(silhouette.look.mask)
+        some = np.random.default_rng(0).permutation(len(rows))[:_COST_SAMPLES]
+        pixels = np.column_stack([columns[some] + 0.5, rows[some] + 0.5])
+        gaps = cKDTree(silhouette.pixels(own)[0]).query(pixels)[0]
+        # Samples of a surface leave gaps of a few pixels in its picture.
+        gap = np.sqrt(len(rows) / _COST_SAMPLES) + _PIXELS
+        cost += outside + float(np.log1p((np.maximum(gaps - gap, 0.0) / _PIXELS) ** 2).mean())
     # Presses reach the outside evenly: the density of each is the inverse of its area.
     cost += float(np.log(at.shape.outside * at.size**2 / evidence.largest**2))
     beyond = max(at.size / evidence.largest - 1.0, 0.0)
     return PlacedShape(at.shape, at.size, at.yaw, at.place, cost + 10.0 * beyond)
-
-
-def _picture_cost(own: FloatArray, silhouette: Silhouette) -> float:
-    """Cost of ``(n, 3)`` surface points outside the silhouette, and of its pixels without points."""
-    outside = float(np.log1p((np.maximum(silhouette.outside_pixels(own), 0.0) / _PIXELS) ** 2).mean())
-    rows, columns = np.nonzero(silhouette.look.mask)
-    some = np.random.default_rng(0).permutation(len(rows))[:_COST_SAMPLES]
-    pixels = np.column_stack([columns[some] + 0.5, rows[some] + 0.5])
-    apart = cKDTree(silhouette.pixels(own)[0]).query(pixels)[0]
-    # Samples of a surface leave gaps of a few pixels in its picture.
-    gap = np.sqrt(len(rows) / _COST_SAMPLES) + _PIXELS
-    return outside + float(np.log1p((np.maximum(apart - gap, 0.0) / _PIXELS) ** 2).mean())
 
 
 KEPT = 5
@@ -325,7 +318,12 @@ def by_retrieval(evidence: ShapeEvidence, library: Sequence[LibraryShape]) -> Sh
     mesh = _bend(ranked[0].mesh, samples)
     known = known_by(mesh, samples, silhouette)
     sides = limited_sides(mesh, samples, silhouette)
-    deviation = _spread(mesh, ranked) ** 2 + READING**2
+    # The root mean square distance to the other shapes, weighted by their fit.
+    weights = np.exp(-(np.array([one.cost for one in ranked]) - ranked[0].cost) / TEMPER)
+    squares = np.zeros(len(mesh.vertices))
+    for weight, one in zip(weights, ranked, strict=True):
+        squares += weight * NearestSurface(one.mesh).distances(mesh.vertices) ** 2
+    deviation = np.sqrt(squares / weights.sum()) ** 2 + READING**2
     deviation += beyond_deviation(mesh, known, sides, evidence.largest) ** 2
     return ShapeEstimate(
         mesh=mesh,
@@ -359,12 +357,3 @@ def _bend(mesh: Mesh, samples: ContactSamples) -> Mesh:
 
 def _covariance(one: FloatArray, other: FloatArray) -> FloatArray:
     return np.exp(-0.5 * cdist(one, other, "sqeuclidean") / ALONG**2)
-
-
-def _spread(mesh: Mesh, ranked: Sequence[PlacedShape]) -> FloatArray:
-    """``(vertices,)`` root mean square distance to the other shapes, weighted by their fit, m."""
-    weights = np.exp(-(np.array([one.cost for one in ranked]) - ranked[0].cost) / TEMPER)
-    squares = np.zeros(len(mesh.vertices))
-    for weight, one in zip(weights, ranked, strict=True):
-        squares += weight * NearestSurface(one.mesh).distances(mesh.vertices) ** 2
-    return np.asarray(np.sqrt(squares / weights.sum()))

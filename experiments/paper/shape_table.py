@@ -209,28 +209,23 @@ def scored_rows(
             answer = published[row.senses]
         elif row.method == "glance":
             answer = glance_points
-        rows[row.name] = _answered(answer, row.part(evidence), truth)
+        part, began = row.part(evidence), now()
+        try:
+            found = answer(part)
+        except (FitRefused, OutOfDomain) as refusal:
+            # A refusal counts as an error of the object's size.
+            refused = {"gross": True, "refused": str(refusal)}
+            rows[row.name] = {"error_m": truth.diagonal, "seconds": now() - began, **refused}
+            continue
+        seconds = now() - began
+        if isinstance(found, ShapeEstimate):
+            scored = _surface_row(found, truth)
+        else:
+            sampled = random_points(truth, PUBLISHED_POINTS, np.random.default_rng(0))[0]
+            published_m = published_points_chamfer(found, sampled)
+            scored = {**_errors(points_error(found, truth, SAMPLES)), "chamfer_points_m": published_m}
+        rows[row.name] = {**scored, "seconds": seconds}
     return rows
-
-
-def _answered(
-    answer: Callable[[ShapeEvidence], FloatArray | ShapeEstimate], part: ShapeEvidence, truth: Mesh
-) -> dict[str, Any]:
-    """Score an answer; a refusal counts as an error of the object's size, and states its reason."""
-    began = now()
-    try:
-        found = answer(part)
-    except (FitRefused, OutOfDomain) as refusal:
-        return {"error_m": truth.diagonal, "seconds": now() - began, "gross": True, "refused": str(refusal)}
-    seconds = now() - began
-    scored = _surface_row(found, truth) if isinstance(found, ShapeEstimate) else _points_row(found, truth)
-    return {**scored, "seconds": seconds}
-
-
-def _points_row(points: FloatArray, truth: Mesh) -> dict[str, Any]:
-    sampled = random_points(truth, PUBLISHED_POINTS, np.random.default_rng(0))[0]
-    published = published_points_chamfer(points, sampled)
-    return {**_errors(points_error(points, truth, SAMPLES)), "chamfer_points_m": published}
 
 
 def points_error(points: FloatArray, truth: Mesh, samples: int) -> ShapeError:

@@ -112,7 +112,13 @@ class Folding(nn.Module):
         self.of_code = nn.Linear(codes, FOLD, bias=False)
         self.inner, self.last = nn.Linear(FOLD, FOLD), nn.Linear(FOLD, 3)
         self.grid: Tensor
-        self.register_buffer("grid", torch.from_numpy(_grid(self.patch)), persistent=False)
+        # Points of a patch, in rows of equal length.
+        across = 1 << (self.patch.bit_length() - 1) // 2
+        x, y = np.meshgrid(
+            np.linspace(-REACH, REACH, across), np.linspace(-REACH, REACH, self.patch // across)
+        )
+        grid = np.stack([x.ravel(), y.ravel()], axis=1).astype(np.float32)
+        self.register_buffer("grid", torch.from_numpy(grid), persistent=False)
 
     def forward(self, code: Tensor, coarse: Tensor) -> Tensor:
         """``(n, DENSE, 3)`` of ``(n, codes)`` and ``(n, coarse, 3)``."""
@@ -147,7 +153,11 @@ class PaperCompletionNetwork(nn.Module):
     def __init__(self, sense: str) -> None:
         super().__init__()
         self.sense, self.coarse = sense, COARSE[sense]
-        self.streams = nn.ModuleList([SenseStream(_encoder(name), self.coarse) for name, _ in INPUTS[sense]])
+        self.streams = nn.ModuleList()
+        for name, _ in INPUTS[sense]:
+            touched = name == "touched"
+            encoder = PointEncoder(128, 256, 512, CODE) if touched else ResNet18(1, CODE)
+            self.streams.append(SenseStream(encoder, self.coarse))
         count = len(self.streams)
         self.merge = nn.Linear(3 * self.coarse * count, 3 * self.coarse) if count > 1 else None
         self.fold = Folding(CODE * count, self.coarse)
@@ -176,17 +186,6 @@ class PaperCompletionNetwork(nn.Module):
         outputs = [float_value("completed", ("n", DENSE, 3))]
         what = "Touched places of an object, its silhouette, or both, to points all over it."
         return bytes(nodes.model(self.sense, inputs, outputs, what).SerializeToString())
-
-
-def _encoder(name: str) -> PointEncoder | ResNet18:
-    return PointEncoder(128, 256, 512, CODE) if name == "touched" else ResNet18(1, CODE)
-
-
-def _grid(count: int) -> np.ndarray:
-    """``(count, 2)`` float32 points of a patch, in rows of equal length."""
-    across = 1 << (count.bit_length() - 1) // 2
-    x, y = np.meshgrid(np.linspace(-REACH, REACH, across), np.linspace(-REACH, REACH, count // across))
-    return np.stack([x.ravel(), y.ravel()], axis=1).astype(np.float32)
 
 
 _TAKES = {

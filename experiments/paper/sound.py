@@ -382,7 +382,12 @@ def between_nodes(modes: Modes, allowed: BoolArray, each: int, seed: int) -> Sou
     faces, quadratic = _elements(modes.faces)
     faces = np.repeat(faces[allowed[faces].all(axis=1)], each, axis=0)
     shares = np.random.default_rng([seed, 2]).dirichlet(np.ones(3), size=len(faces))
-    weights = _quadratic(shares) if quadratic else shares
+    weights = shares
+    if quadratic:
+        # Shape functions of a six-node triangle: corners, then middles of ab, bc, ca.
+        a, b, c = shares.T
+        corners = [a * (2.0 * a - 1.0), b * (2.0 * b - 1.0), c * (2.0 * c - 1.0)]
+        weights = np.stack([*corners, 4.0 * a * b, 4.0 * b * c, 4.0 * c * a], axis=1)
     points = np.einsum("kc,kcd->kd", weights, modes.points[faces])
     shapes = np.zeros((len(faces), *modes.shapes.shape[1:]))
     for node in range(faces.shape[1]):
@@ -403,10 +408,3 @@ def _elements(faces: IntArray) -> tuple[IntArray, bool]:
         return faces, False
     corners = (first[:, 0], second[:, 1], third[:, 2])
     return np.stack([*corners, *middles], axis=1), True
-
-
-def _quadratic(shares: FloatArray) -> FloatArray:
-    """Shape functions of a six-node triangle: corners, then middles of ab, bc, ca."""
-    a, b, c = shares.T
-    corners = [a * (2.0 * a - 1.0), b * (2.0 * b - 1.0), c * (2.0 * c - 1.0)]
-    return np.stack([*corners, 4.0 * a * b, 4.0 * b * c, 4.0 * c * a], axis=1)

@@ -46,7 +46,7 @@ from harness.objectfile.file import ObjectFile
 from harness.objectfile.runtime import Network
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.touch.graph import codes_graph
-from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes
+from harness.objectfile.touch.nodes import NodeSearch
 from harness.objectfile.touch.touch import Maps, ReferenceMaps, open_touch
 from harness.objectfile.touch_entries import GelEntry
 from harness.objectfile.vision_tensors import graph_input
@@ -127,12 +127,6 @@ class TouchBench:
         return picture_scores(rendered, self.picture(self.maps[number]))
 
 
-def learning_places(mesh: Mesh, calibration: TactileCalibration) -> PressBench:
-    """Where networks of an object learn."""
-    nodes: SurfaceNodes = choose_nodes(mesh, SPACING)
-    return PressBench(mesh, RasterMesh(mesh), GELSIGHT_R15, calibration.header.skirt, nodes, NEAR)
-
-
 def touch_bench(
     mesh: Mesh, presses: int, kind: Kind, work: RenderingWork, codes: NodeSearch | None = None
 ) -> TouchBench:
@@ -150,9 +144,15 @@ def touch_bench(
     """
     work.report("touch: simulating presses", 0.0)
     calibration = shipped_calibration("gelsight_r15_bench")
-    places = learning_places(mesh, calibration)
+    nodes, skirt = choose_nodes(mesh, SPACING), calibration.header.skirt
+    places = PressBench(mesh, RasterMesh(mesh), GELSIGHT_R15, skirt, nodes, NEAR)
     points = SurfaceSearch(mesh).spread(presses, PRESS_SEED)[0]
-    drawn = _presses(mesh, points, kind)
+    normals, nothing = smooth_normals(mesh, points), np.zeros(len(points))
+    if kind == "upright":
+        drawn = Presses(points, normals, nothing + MIDDLE, nothing, nothing, nothing)
+    else:
+        posed = pressed(points, normals, PRESS_SEED, DEPTHS, MOST_TILT)
+        drawn = Presses(points, normals, posed.depths, posed.tilts, posed.azimuths, nothing)
     searches = [NodeSearch(places.nodes, NEAR), *([] if codes is None else [codes])]
     near = np.all([each.nearest(drawn)[1] <= each.most for each in searches], axis=0)
     reference = reference_maps(places.raster, drawn, places.sensor, places.skirt)
@@ -160,14 +160,6 @@ def touch_bench(
     if not len(chosen):
         raise OutOfDomain(f"none of {presses} presses is possible; is the mesh inside out?")
     return TouchBench(places, drawn[chosen], reference.maps[chosen], calibration)
-
-
-def _presses(mesh: Mesh, points: FloatArray, kind: Kind) -> Presses:
-    normals, nothing = smooth_normals(mesh, points), np.zeros(len(points))
-    if kind == "upright":
-        return Presses(points, normals, nothing + MIDDLE, nothing, nothing, nothing)
-    drawn = pressed(points, normals, PRESS_SEED, DEPTHS, MOST_TILT)
-    return Presses(points, normals, drawn.depths, drawn.tilts, drawn.azimuths, nothing)
 
 
 COLOUR_INPUTS = 5
@@ -309,35 +301,33 @@ def touch_methods(bench: TouchBench, of: ObjectFile, work: RenderingWork) -> lis
         work: where networks are stored.
     """
     largest = TOUCH_PROFILES["standard"].codes
+    own, entry = [], of.description.touch
+    if entry is not None and entry.codes is not None:
+        network = entry.codes.network
+        own = [
+            RenderingMethod(
+                f"codes of the ObjectFile, {network.bytes / 1e6:.1f} MB",
+                "ours",
+                (network.sha256,),
+                lambda: MadeMethod(_drawn(bench, open_touch(of, "codes").at)),
+            )
+        ]
+    gel = GelEntry.of(bench.places.sensor, bench.places.skirt)
     return [
         untouched(bench),
         first_touch(bench, work),
         second_touch(bench, work),
         _codes("codes of 1 MB", SMALL_CODES, "ours, smallest", bench),
-        *_own(bench, of),
+        *own,
         _codes("codes of 18 MB, profile standard", largest, "ours, largest", bench),
         RenderingMethod(
             "the mesh itself, rasterised",
             "other",
             (),
-            lambda: _reference(bench),
+            lambda: MadeMethod(_drawn(bench, ReferenceMaps(bench.places.raster, gel))),
             "the reference: no error by definition",
         ),
     ]  # fmt: skip
-
-
-def _own(bench: TouchBench, of: ObjectFile) -> list[RenderingMethod]:
-    entry = of.description.touch
-    if entry is None or entry.codes is None:
-        return []
-    network = entry.codes.network
-    name = f"codes of the ObjectFile, {network.bytes / 1e6:.1f} MB"
-    return [RenderingMethod(name, "ours", (network.sha256,), lambda: _opened(bench, of))]
-
-
-def _opened(bench: TouchBench, of: ObjectFile) -> MadeMethod:
-    touch = open_touch(of, "codes")
-    return MadeMethod(_drawn(bench, touch.at))
 
 
 def _codes(name: str, spec: CodesSpec, column: Column, bench: TouchBench) -> RenderingMethod:
@@ -385,11 +375,6 @@ def _by_colours(bench: TouchBench, work: RenderingWork) -> MadeMethod:
     shape = places.sensor.rows, places.sensor.columns
     network = ColourNetwork(Network(data, COLOURS_FILE, [place], [colours]), low, high, shape)
     return MadeMethod(lambda number: network.picture(bench.presses.points[number]), seconds)
-
-
-def _reference(bench: TouchBench) -> MadeMethod:
-    gel = GelEntry.of(bench.places.sensor, bench.places.skirt)
-    return MadeMethod(_drawn(bench, ReferenceMaps(bench.places.raster, gel)))
 
 
 def _drawn(bench: TouchBench, maps: Maps) -> Render:
