@@ -197,7 +197,15 @@ def measure_sense(
             except TorchMissing as reason:
                 missing[method.name] = str(reason)
         work.report(f"{bench.sense}: seconds", 1.0)
-        timed = _timing(bench, [each for each in methods if each.name in worth], workshop, work)
+        rendered = [each for each in methods if each.name in worth]
+        identities = [[each.name, list(each.identity)] for each in rendered]
+        key = digest(["rendering seconds", VERSION, bench.identity, identities])
+        stored = work.store.get(key)
+        if isinstance(stored, Mapping):
+            timed = {name.removeprefix("of "): seconds for name, seconds in stored.items()}
+        else:
+            timed = timed_in_turn({each.name: workshop.made(each) for each in rendered}, bench.count)
+            work.store.put(key, {f"of {name}": seconds for name, seconds in timed.items()})
     for method in methods:
         if method.name in missing:
             yield MeasuredMethod(method, {}, np.empty(0), missing=missing[method.name])
@@ -221,21 +229,6 @@ def _quality(
     found["made_s"] = np.array(made.seconds)
     work.store.put(key, found)
     return found
-
-
-def _timing(
-    bench: RenderingBench, methods: Sequence[RenderingMethod], workshop: _Workshop, work: RenderingWork
-) -> Mapping[str, FloatArray]:
-    """``(k,)`` CPU s of each method, by its name."""
-    every = [[method.name, list(method.identity)] for method in methods]
-    key = digest(["rendering seconds", VERSION, bench.identity, every])
-    stored = work.store.get(key)
-    if isinstance(stored, Mapping):
-        return {name.removeprefix("of "): seconds for name, seconds in stored.items()}
-    made = {method.name: workshop.made(method) for method in methods}
-    taken = timed_in_turn(made, bench.count)
-    work.store.put(key, {f"of {name}": seconds for name, seconds in taken.items()})
-    return taken
 
 
 def timed_in_turn(made: Mapping[str, MadeMethod], count: int, rounds: int = ROUNDS) -> dict[str, FloatArray]:

@@ -155,8 +155,8 @@ class PaperCompletionNetwork(nn.Module):
         self.sense, self.coarse = sense, COARSE[sense]
         self.streams = nn.ModuleList()
         for name, _ in INPUTS[sense]:
-            touched = name == "touched"
-            encoder = PointEncoder(128, 256, 512, CODE) if touched else ResNet18(1, CODE)
+            encoder: PointEncoder | ResNet18
+            encoder = PointEncoder(128, 256, 512, CODE) if name == "touched" else ResNet18(1, CODE)
             self.streams.append(SenseStream(encoder, self.coarse))
         count = len(self.streams)
         self.merge = nn.Linear(3 * self.coarse * count, 3 * self.coarse) if count > 1 else None

@@ -110,10 +110,17 @@ def error_spared(evidence: ShapeEvidence, estimate: ShapeEstimate, lines: FloatA
     Returns:
         ``(n,)`` m, none negative; None where the estimate has no hypotheses, or they are alike.
     """
-    shapes, weights = _hypotheses(estimate)
+    shapes, shares = [], []
+    stated: Sequence[Any] = estimate.details.get("hypotheses", ())  # type: ignore[assignment]
+    about = SHAPES // max(len(stated), 1)
+    for one in stated:
+        every = [one["numbers"], *one.get("about", ())[:about]]
+        code: IntArray = np.array(one["code"], dtype=np.int64)
+        shapes += [FamilyShape(one["class"], code, np.array(numbers)) for numbers in every]
+        shares += [one["weight"] / len(every)] * len(every)
     if not shapes:
         return None
-    apart = distances_apart(shapes)
+    weights, apart = np.array(shares), distances_apart(shapes)
     now = bayes_risk(weights, apart)
     if now < AGREE:
         return None
@@ -170,19 +177,6 @@ def distances_apart(shapes: Sequence[FamilyShape]) -> FloatArray:
         if len(near):
             one_way[k] = np.abs(near - near[:, k : k + 1]).mean(axis=0)
     return 0.5 * (one_way + one_way.T)
-
-
-def _hypotheses(estimate: ShapeEstimate) -> tuple[list[FamilyShape], FloatArray]:
-    """The shapes of an estimate, and ``(n,)`` their weights."""
-    shapes, weights = [], []
-    stated: Sequence[Any] = estimate.details.get("hypotheses", ())  # type: ignore[assignment]
-    about = SHAPES // max(len(stated), 1)
-    for one in stated:
-        every = [one["numbers"], *one.get("about", ())[:about]]
-        code: IntArray = np.array(one["code"], dtype=np.int64)
-        shapes += [FamilyShape(one["class"], code, np.array(numbers)) for numbers in every]
-        weights += [one["weight"] / len(every)] * len(every)
-    return shapes, np.array(weights)
 
 
 BEYOND = 0.02
@@ -261,21 +255,18 @@ def _line(
     tilt, turn = random.uniform(0.0, TILT), random.uniform(0.0, 2.0 * np.pi)
     for share in _LESS:
         forward = rotation_about(aside, share * tilt) @ -normal
-        end = None if forward[2] > _STEEPEST else _end(point, forward, half)
-        if end is not None:
-            return transform(frame_facing(forward, turn), end)
+        if forward[2] > _STEEPEST:
+            continue
+        # Behind the place, the sensor off the support: a line that leads down ends earlier; one that leads
+        # aside is raised, and meets the object higher up.
+        lowest = LOWEST + half * float(np.hypot(forward[0], forward[1]))
+        if forward[2] < -_DOWN:
+            beyond = min(BEYOND, (lowest - point[2]) / forward[2])
+            if beyond < _LEAST_BEYOND:
+                continue
+            end = point + beyond * forward
+        else:
+            end = point + BEYOND * forward
+            end[2] = max(end[2], lowest)
+        return transform(frame_facing(forward, turn), end)
     return None
-
-
-def _end(point: FloatArray, forward: FloatArray, half: float) -> FloatArray | None:
-    """``(3,)`` m in ``stand``: behind a place, the sensor off the support; None where no room is behind it.
-
-    A line that leads down ends earlier; one that leads aside is raised, and meets the object higher up.
-    """
-    lowest = LOWEST + half * float(np.hypot(forward[0], forward[1]))
-    if forward[2] < -_DOWN:
-        beyond = min(BEYOND, (lowest - point[2]) / forward[2])
-        return point + beyond * forward if beyond >= _LEAST_BEYOND else None
-    end = point + BEYOND * forward
-    end[2] = max(end[2], lowest)
-    return np.asarray(end)

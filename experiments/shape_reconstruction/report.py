@@ -49,7 +49,16 @@ def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] |
     words = f"The surface cut by three planes through its middle{beside}."
     sections.append(PageSection("Sections", words, album.drawing("sections", figure)))
     if answer.evidence.look is not None:
-        sections.append(_seen(scored, answer, album))
+        recording = scored.run.recording
+        records = (recording.step(index) for index in range(recording.committed))  # the look is the first
+        look = next(record for record in records if IMAGE in record.readings)
+        picture = np.asarray(np.median(look.readings[IMAGE].values, axis=0)).astype(np.uint8)
+        words = (
+            "What differs from the picture of the bare bench is taken for the object. No more of the picture "
+            "is used than this outline."
+        )
+        outline = album.photograph("silhouette", mask_figure(picture, answer.evidence.look.mask))
+        sections.append(PageSection("The silhouette", words, outline))
     return write_run_page(named(_NAME), scored, comparison, health, folder, tuple(sections))
 
 
@@ -112,17 +121,3 @@ def _strip(scored: Scored, answer: ShapeAnswer, truth: Mesh | None, album: Album
     if all(one.shown is None for one in found):
         return PageSection("Press by press", f"{words} None of them said enough for a surface.")
     return PageSection("Press by press", words, album.photograph("strip", strip_figure(found)))
-
-
-def _seen(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
-    recording = scored.run.recording
-    records = (recording.step(index) for index in range(recording.committed))  # the look is the first
-    look = next(record for record in records if IMAGE in record.readings)
-    picture = np.asarray(np.median(look.readings[IMAGE].values, axis=0)).astype(np.uint8)
-    assert answer.evidence.look is not None
-    words = (
-        "What differs from the picture of the bare bench is taken for the object. No more of the picture is "
-        "used than this outline."
-    )
-    figure = mask_figure(picture, answer.evidence.look.mask)
-    return PageSection("The silhouette", words, album.photograph("silhouette", figure))

@@ -8,7 +8,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 from skimage.graph import MCP_Geometric
 
-from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.faces.isosurface import isosurface
 from harness.basics.mesh import Mesh
 
@@ -123,7 +123,13 @@ def extract_body(
     labels: IntArray = found.astype(np.int64)
     notes: tuple[str, ...] = ()
     if count > 1:
-        on_piece = _count_contacts(labels, count, origin, pitch, contacts)
+        on_piece = np.zeros(count + 1, np.int64)  # contact points that lie on each piece, by its label
+        if contacts is not None and len(contacts):
+            corners = np.argwhere(labels > 0)
+            scaled = (contacts - origin) / pitch
+            apart, nearest = cKDTree(corners).query(scaled, distance_upper_bound=ON_PIECE)
+            near = np.asarray(nearest)[np.isfinite(apart)]
+            np.add.at(on_piece, labels[tuple(corners[near].T)], 1)
         field, notes = _join(field, pitch, labels, on_piece)
         inside = field < -INSIDE * pitch
     filled = ndimage.binary_fill_holes(np.pad(inside, 1, constant_values=False))[1:-1, 1:-1, 1:-1]
@@ -133,20 +139,6 @@ def extract_body(
     # Corners too near to zero to be counted as inside must not become pieces of their own.
     field = np.where(inside | cavity, field, np.maximum(field, INSIDE * pitch))
     return BodySurface(isosurface(field, origin, pitch), notes)
-
-
-def _count_contacts(
-    labels: IntArray, count: int, origin: FloatArray, pitch: float, contacts: FloatArray | None
-) -> IntArray:
-    """``(count + 1,)`` number of contact points that lie on each piece, by its label."""
-    found = np.zeros(count + 1, np.int64)
-    if contacts is None or len(contacts) == 0:
-        return found
-    corners = np.argwhere(labels > 0)
-    apart, nearest = cKDTree(corners).query((contacts - origin) / pitch, distance_upper_bound=ON_PIECE)
-    near = np.asarray(nearest)[np.isfinite(apart)]
-    np.add.at(found, labels[tuple(corners[near].T)], 1)
-    return found
 
 
 def _join(
@@ -163,20 +155,16 @@ def _join(
     field = np.where(removed[labels], np.maximum(np.abs(field), pitch), field)
     body = labels == main
     for piece in np.flatnonzero(wanted):
-        bridge = _bridge(field / pitch, body, labels == piece)
+        # A bar three cells thick, where the field is lowest between the two pieces.
+        costs = MCP_Geometric(_STEP + np.maximum(field / pitch, 0.0))
+        ends = np.argwhere(labels == piece)
+        total, _ = costs.find_costs(np.argwhere(body), ends, find_all_ends=False)
+        end = ends[int(np.argmin(total[tuple(ends.T)]))]
+        path = np.zeros(field.shape, bool)
+        path[tuple(np.array(costs.traceback(tuple(int(k) for k in end))).T)] = True
+        bridge = np.asarray(ndimage.binary_dilation(path, np.ones((3, 3, 3), bool)))
         field = np.where(bridge, np.minimum(field, -_BRIDGE * pitch), field)
         body = body | bridge | (labels == piece)
     joined, gone = int(wanted.sum()), int(removed.sum())
     note = f"the surface was in {joined + gone + 1} pieces: {joined} joined to the main one, {gone} removed"
     return field, (note,)
-
-
-def _bridge(cells: FloatArray, body: BoolArray, piece: BoolArray) -> BoolArray:
-    """Corners of a bar three cells thick between two pieces, where the field is lowest between them."""
-    costs = MCP_Geometric(_STEP + np.maximum(cells, 0.0))
-    ends = np.argwhere(piece)
-    total, _ = costs.find_costs(np.argwhere(body), ends, find_all_ends=False)
-    end = ends[int(np.argmin(total[tuple(ends.T)]))]
-    path = np.zeros(cells.shape, bool)
-    path[tuple(np.array(costs.traceback(tuple(int(k) for k in end))).T)] = True
-    return np.asarray(ndimage.binary_dilation(path, np.ones((3, 3, 3), bool)))

@@ -50,7 +50,13 @@ def median_surface(mixture: Mixture, pitch: float, contacts: FloatArray | None =
     shapes, weights = [shape for shape, _ in kept], np.array([weight for _, weight in kept])
     corners = np.concatenate([corners_of(shape) for shape in shapes])
     low, high = corners.min(axis=0) - 4e-3, corners.max(axis=0) + 4e-3
-    thinnest = min(_thickness(shape) for shape in shapes)
+    thinnest = np.inf
+    for shape in shapes:
+        # The shortest side of a body's own box; of a hollow one, wall or floor where that is thinner.
+        q = np.empty(PREPARED)
+        prepare(shape.code, shape.theta, q)
+        shortest = float((q[BOX + 3 : BOX + 6] - q[BOX : BOX + 3]).min())
+        thinnest = min(thinnest, shortest, _wall(shape))
     coarsest = max(min(pitch, thinnest / _RESOLVED), float((high - low).max()) / _MOST)
     for finer in _FINER:
         cell = finer * coarsest
@@ -67,14 +73,6 @@ def median_surface(mixture: Mixture, pitch: float, contacts: FloatArray | None =
         inside = inside - (inside.min() + _SLIVER * finer * coarsest)
     heights = low[2] + cell * np.arange(inside.shape[2])
     return extract_body(np.maximum(inside, -BELOW - heights), low, cell, contacts)
-
-
-def _thickness(shape: FamilyShape) -> float:
-    """M of the shortest side of a body's own box; of a hollow one, of wall or floor where that is thinner."""
-    q = np.empty(PREPARED)
-    prepare(shape.code, shape.theta, q)
-    shortest = float((q[BOX + 3 : BOX + 6] - q[BOX : BOX + 3]).min())
-    return min(shortest, _wall(shape))
 
 
 def _wall(shape: FamilyShape) -> float:

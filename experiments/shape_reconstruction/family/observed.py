@@ -7,7 +7,7 @@ import numpy as np
 from scipy import ndimage
 
 from experiments.shape_reconstruction.contact_points import CLEAR
-from experiments.shape_reconstruction.evidence import GuardedTouch, SeenMask, ShapeEvidence
+from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.basics.compiled import compiled
 from harness.basics.geometry import apply
@@ -118,6 +118,12 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
     clear = [touch.clear[: CLEAR // 2 if coarse else CLEAR] for touch in contacts]
     sigma = np.array([np.hypot(touch.sigma, MODEL) for touch in contacts])
     stopped = () if coarse else evidence.ended_by_housing
+    faces = []
+    for touch in stopped:
+        # The middle of the housing's face at the end of a way, and half of either side.
+        turn, half = touch.stand_from_gel[:3, :3], 0.5 * np.array(evidence.housing)
+        middle = apply(touch.stand_from_gel, np.array([[0.0, 0.0, -evidence.gel_thickness]]))[0]
+        faces.append([middle, half[0] * turn[:, 0], half[1] * turn[:, 1]])
     most = SUPPOSED // 3 if coarse else SUPPOSED
     supposed = evidence.supposed[:: max(-(-len(evidence.supposed) // most), 1)]
     rays = no_rays() if evidence.look is None else sight_rays(evidence.look, coarse)
@@ -138,7 +144,7 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
         clear=_stacked(clear, 3),
         clear_touch=_numbered(clear),
         clear_worth=np.array([min(1.0, CLEAR_WORTH / max(len(rows), 1)) for rows in clear]),
-        faces=np.array([_face(evidence, touch) for touch in stopped]).reshape(-1, 3, 3),
+        faces=np.array(faces).reshape(-1, 3, 3),
         face_gel=np.array([touch.stand_from_gel[:3, :3] for touch in stopped]).reshape(-1, 3, 3),
         face_sigma=np.array([LOOSELY * np.hypot(touch.sigma, MODEL) for touch in stopped]),
         free=_free_places(evidence, coarse),
@@ -151,13 +157,6 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
         supposed_right=_along_support(rays.right, rays.middle),
         supposed_down=_along_support(rays.down, rays.middle),
     )
-
-
-def _face(evidence: ShapeEvidence, touch: GuardedTouch) -> FloatArray:
-    """``(3, 3)`` m: the middle of the housing's face at the end of a way, and half of either side."""
-    turn, half = touch.stand_from_gel[:3, :3], 0.5 * np.array(evidence.housing)
-    middle = apply(touch.stand_from_gel, np.array([[0.0, 0.0, -evidence.gel_thickness]]))[0]
-    return np.array([middle, half[0] * turn[:, 0], half[1] * turn[:, 1]])
 
 
 def _along_support(shift: FloatArray, sight: FloatArray) -> FloatArray:
@@ -244,7 +243,15 @@ def sight_rays(look: SeenMask, coarse: bool) -> SightRays:
     outline = _spread(_outline(look.mask, clear), _GRAZING[which])
     rows, columns = np.nonzero((ndimage.distance_transform_edt(look.mask) > 1.5) & clear)
     inside = _spread(np.column_stack([columns + 0.5, rows + 0.5]), _MEETING[which])
-    outside, away = _outside(look.mask, clear, which)
+    # Places around the mask, dense near it: what is near is what a shape would stick out into.
+    distances = ndimage.distance_transform_edt(~look.mask)
+    around, pixels_away = [np.empty((0, 2))], [np.empty(0)]
+    for pixels, *counts in _PASSING:
+        rows, columns = np.nonzero((np.abs(distances - pixels) < 0.8) & clear)
+        spread = _spread(np.column_stack([columns + 0.5, rows + 0.5]), counts[which])
+        around.append(spread)
+        pixels_away.append(np.full(len(spread), pixels))
+    outside, away = np.concatenate(around), np.concatenate(pixels_away)
     places = np.concatenate([outline, inside, outside])
     kinds = np.repeat([GRAZE, MEET, PASS], [len(outline), len(inside), len(outside)]).astype(np.int64)
     worth = np.ones(len(places))
@@ -311,21 +318,6 @@ def _outline(mask: BoolArray, clear: BoolArray) -> FloatArray:
     height, width = mask.shape
     edge = (places[:, 0] < 3) | (places[:, 1] < 3) | (places[:, 0] > width - 3) | (places[:, 1] > height - 3)
     return np.asarray(places[~edge])
-
-
-def _outside(mask: BoolArray, clear: BoolArray, which: int) -> tuple[FloatArray, FloatArray]:
-    """``(n, 2)`` places around the mask, and how many pixels each is from it.
-
-    Dense near it: what is near is what a shape would stick out into.
-    """
-    away = ndimage.distance_transform_edt(~mask)
-    found, distances = [np.empty((0, 2))], [np.empty(0)]
-    for pixels, *counts in _PASSING:
-        rows, columns = np.nonzero((np.abs(away - pixels) < 0.8) & clear)
-        places = _spread(np.column_stack([columns + 0.5, rows + 0.5]), counts[which])
-        found.append(places)
-        distances.append(np.full(len(places), pixels))
-    return np.concatenate(found), np.concatenate(distances)
 
 
 @compiled

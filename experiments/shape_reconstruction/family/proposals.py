@@ -98,24 +98,28 @@ def lay(shape: FamilyShape, guides: Guides, random: _Random, place_error: float,
     theta[layout.X : layout.Y + 1] = _middle(shape, theta, guides, random, place_error, long)
     count = yaws if has_yaw(shape.code) else 1
     laid = np.repeat(theta[None], count, axis=0)
-    laid[:, layout.YAW] = _turns(guides, random, turn, count)
+    # Turns that the readings propose and their opposites, then any, evenly spread.
+    turns = random.uniform(0.0, 2.0 * np.pi) + 2.0 * np.pi * np.arange(count) / count
+    if turn is not None:
+        proposed = turn + np.pi * np.arange(count) + random.normal(0.0, 0.05, count)
+        turns[:4] = proposed[:4]
+    elif len(guides.turns):
+        few = (count + 1) // 3
+        turns[:few] = random.choice(guides.turns, few) + 0.5 * np.pi * random.integers(0, 4, few)
+    laid[:, layout.YAW] = turns
     if shape.code[layout.PLAN] == CORED and len(guides.places) >= ENOUGH and random.random() < SPANNED:
+        # A body with straight sides has the sides and the middle of the contacts' box, as it is turned.
         for one in laid:
-            _span(one, guides.places, random)
+            cosine, sine = np.cos(one[layout.YAW]), np.sin(one[layout.YAW])
+            along = guides.places[:, :2] @ np.array([[cosine, -sine], [sine, cosine]])
+            low, high = along.min(axis=0), along.max(axis=0)
+            half = 0.5 * (high - low) * np.exp(random.uniform(0.0, _BEYOND))
+            middle = 0.5 * (low + high)
+            one[layout.X] = cosine * middle[0] - sine * middle[1]
+            one[layout.Y] = sine * middle[0] + cosine * middle[1]
+            corner = float(np.exp(one[layout.RADII : layout.RADII + KNOTS].max()))
+            one[[layout.CORE_X, layout.CORE_Y]] = np.log(np.maximum(half - corner, 0.1 * half))
     return laid
-
-
-def _span(theta: FloatArray, places: FloatArray, random: _Random) -> None:
-    """Give a body with straight sides the sides and the middle of the contacts' box, as it is turned."""
-    cosine, sine = np.cos(theta[layout.YAW]), np.sin(theta[layout.YAW])
-    along = places[:, :2] @ np.array([[cosine, -sine], [sine, cosine]])
-    low, high = along.min(axis=0), along.max(axis=0)
-    half = 0.5 * (high - low) * np.exp(random.uniform(0.0, _BEYOND))
-    middle = 0.5 * (low + high)
-    theta[layout.X] = cosine * middle[0] - sine * middle[1]
-    theta[layout.Y] = sine * middle[0] + cosine * middle[1]
-    corner = float(np.exp(theta[layout.RADII : layout.RADII + KNOTS].max()))
-    theta[[layout.CORE_X, layout.CORE_Y]] = np.log(np.maximum(half - corner, 0.1 * half))
 
 
 def _log_scale(shape: FamilyShape, guides: Guides, random: _Random, turn: float | None) -> float:
@@ -157,19 +161,6 @@ def _middle(
             return np.asarray(0.5 * (level.min(axis=0) + level.max(axis=0)))
     away = (guides.eye[2] - 0.45 * height) / max(-guides.middle_ray[2], 0.05)
     return np.asarray((guides.eye + away * guides.middle_ray)[:2])
-
-
-def _turns(guides: Guides, random: _Random, turn: float | None, count: int) -> FloatArray:
-    """``(count,)`` rad: those that the readings propose and their opposites, then any, evenly spread."""
-    even = random.uniform(0.0, 2.0 * np.pi) + 2.0 * np.pi * np.arange(count) / count
-    if turn is not None:
-        proposed = turn + np.pi * np.arange(count) + random.normal(0.0, 0.05, count)
-        proposed[min(4, count) :] = even[min(4, count) :]
-        return np.asarray(proposed)
-    if len(guides.turns):
-        few = (count + 1) // 3
-        even[:few] = random.choice(guides.turns, few) + 0.5 * np.pi * random.integers(0, 4, few)
-    return np.asarray(even)
 
 
 _LEVEL = 0.5
