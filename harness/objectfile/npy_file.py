@@ -42,7 +42,10 @@ def npy_array(data: bytes, name: str, dtype: str, shape: tuple[int | None, ...],
         found, fortran, kind = np.lib.format.read_array_header_1_0(stream, max_header_size=_LONGEST_HEADER)
     except ValueError as error:
         raise DataRefused(f"{name} is no .npy file of numbers; build the object again") from error
-    if fortran or kind != np.dtype(dtype) or not _fits(found, shape):
+    fits = len(found) == len(shape) and all(
+        size >= 1 if fixed is None else size == fixed for size, fixed in zip(found, shape, strict=True)
+    )
+    if fortran or kind != np.dtype(dtype) or not fits:
         raise DataRefused(f"{name} holds {kind} {found}, not {wanted}; build the object again")
     start, count = stream.tell(), math.prod(found)
     expected = start + kind.itemsize * count
@@ -51,11 +54,3 @@ def npy_array(data: bytes, name: str, dtype: str, shape: tuple[int | None, ...],
             f"{name} has {len(data)} bytes, not the {expected} of {wanted}, {found}; copy it again"
         )
     return np.frombuffer(data, dtype, count, start).reshape(found)
-
-
-def _fits(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
-    if len(found) != len(shape):
-        return False
-    return all(
-        size >= 1 if wanted is None else size == wanted for size, wanted in zip(found, shape, strict=True)
-    )

@@ -6,7 +6,6 @@ unscaled; both sounds are divided by the reference's peak, as the renderer publi
 divides by it.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -130,8 +129,3 @@ def _dirichlet(modes: Modes) -> Any:
     ).tocsr()
     both = half + half.T
     return (diags_array(np.asarray(both.sum(axis=1))) - both).tocsr()
-
-
-def quantiles(errors: FloatArray) -> Mapping[str, float]:
-    """Median and 95th percentile."""
-    return {"median": float(np.median(errors)), "p95": float(np.quantile(errors, 0.95))}

@@ -105,31 +105,18 @@ def build_audio(
         made = with_audio(created, part)
     report("verifying what was written", 0.0)
     with timed(seconds, "verify"):
-        _check(made)
+        failed = [check for check in verify(made) if not check.passed]
+        if failed:
+            raise DataRefused(
+                f"{made.folder}: {failed[0].name}: {failed[0].said}; delete the folder and build again"
+            )
     ordered = {before + stage: seconds[before + stage] for before in ("", CPU) for stage in STAGES}
-    return BuiltAudio(_with_seconds(made, ordered), modes, audio, said, ordered)
-
-
-def _check(made: ObjectFile) -> None:
-    """Read what was written.
-
-    Raises:
-        DataRefused: it is not what it says.
-    """
-    failed = [check for check in verify(made) if not check.passed]
-    if failed:
-        raise DataRefused(
-            f"{made.folder}: {failed[0].name}: {failed[0].said}; delete the folder and build again"
-        )
-
-
-def _with_seconds(made: ObjectFile, seconds: Mapping[str, float]) -> ObjectFile:
-    """The same files, and in ``object.json`` what they took."""
-    audio = made.description.audio
-    assert audio is not None
-    spent = {"seconds": wall(seconds), "cpu_seconds": cpu(seconds)}
-    provenance = audio.provenance.model_copy(update=spent)
-    return with_part(made, "audio", audio.model_copy(update={"provenance": provenance}), {})
+    entry = made.description.audio
+    assert entry is not None
+    spent = {"seconds": wall(ordered), "cpu_seconds": cpu(ordered)}
+    provenance = entry.provenance.model_copy(update=spent)
+    timed_file = with_part(made, "audio", entry.model_copy(update={"provenance": provenance}), {})
+    return BuiltAudio(timed_file, modes, audio, said, ordered)
 
 
 def _modes(

@@ -2,7 +2,6 @@
 
 import fcntl
 import os
-import shutil
 import socket
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -82,13 +81,6 @@ class Runner(Protocol):
 
         Whoever stops taking records, or is interrupted, stops the jobs that run.
         """
-
-
-def build_all(plan: BuildPlan, spec: BuildSpec, of: BuildFolder, runner: Runner) -> Iterator[ObjectRecord]:
-    """Build the waiting objects in a folder that the caller holds; yields the record of each."""
-    shutil.rmtree(of.aside, ignore_errors=True)
-    of.aside.mkdir()
-    yield from runner.run(Job(item, spec, of) for item in plan.waiting)
 
 
 @contextmanager

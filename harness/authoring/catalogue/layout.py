@@ -1,14 +1,12 @@
 """Where everything of a build lies in its folder."""
 
 import shutil
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
 
-from harness.authoring.catalogue.rows import ExcludedRow
 from harness.basics.errors import CalibrationRefused, WrongUse
 from harness.basics.files.json_file import read_model, write_model
 from harness.basics.toml_file import StrictModel
@@ -99,14 +97,6 @@ class BuildSettings(StrictModel):
     catalogue: str  #: path of its file.
     names: tuple[str, ...]  #: of the objects, in the catalogue's order.
     excluded: tuple[ExcludedEntry, ...] = ()  #: rows that were not built.
-
-
-def write_settings(
-    of: BuildFolder, catalogue: Path, names: Sequence[str], excluded: Sequence[ExcludedRow]
-) -> None:
-    """Note what is built now."""
-    entries = tuple(ExcludedEntry(name=row.name, reason=row.reason) for row in excluded)
-    write_model(BuildSettings(catalogue=str(catalogue), names=tuple(names), excluded=entries), of.settings)
 
 
 def read_settings(of: BuildFolder) -> BuildSettings:

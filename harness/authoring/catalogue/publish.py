@@ -116,13 +116,10 @@ def publish(
     found = []
     for index, name in enumerate(names):
         on(name, index / len(names))
-        found.append(_published(of, store, name))
+        record = read_record(of, name)
+        if record is None or not stands(of, record, record.key):
+            found.append(SentObject(name, 0, "not built"))
+            continue
+        sent = store.put(of.object(name), record)
+        found.append(SentObject(name, sent, "sent" if sent else "there"))
     return found
-
-
-def _published(of: BuildFolder, store: ObjectStore, name: str) -> SentObject:
-    record = read_record(of, name)
-    if record is None or not stands(of, record, record.key):
-        return SentObject(name, 0, "not built")
-    sent = store.put(of.object(name), record)
-    return SentObject(name, sent, "sent" if sent else "there")

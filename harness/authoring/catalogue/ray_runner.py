@@ -55,7 +55,9 @@ class RayRunner:
         waiting, running = iter(jobs), dict[Any, Job]()
         try:
             while True:
-                _fill(running, waiting, remote, self._limits, self._in_flight(ray))
+                most = self._in_flight(ray)
+                while len(running) < most and (job := next(waiting, None)) is not None:
+                    running[remote.remote(job, self._limits)] = job
                 if not running:
                     return
                 done, _ = ray.wait(list(running), timeout=_LOOK)
@@ -99,16 +101,6 @@ def _imported() -> Any:
     except ImportError:
         raise WrongUse("--runner ray needs Ray; install Touchstone with its extra `cluster`") from None
     return ray
-
-
-def _fill(
-    running: dict[Any, Job], waiting: Iterator[Job], remote: Any, limits: WorkerLimits, most: int
-) -> None:
-    while len(running) < most:
-        job = next(waiting, None)
-        if job is None:
-            return
-        running[remote.remote(job, limits)] = job
 
 
 def _record(ray: Any, reference: Any, job: Job) -> ObjectRecord:

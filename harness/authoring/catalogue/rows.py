@@ -324,15 +324,15 @@ def read_toml_rows(path: Path) -> list[tuple[str, dict[str, str]]]:
         WrongUse: the file cannot be read, or has an unknown key or a quantity without its unit.
     """
     tables = load_toml(path, CatalogueFile).object
-    return [(f"object {index + 1}", _as_cells(table)) for index, table in enumerate(tables)]
-
-
-def _as_cells(table: ObjectTable) -> dict[str, str]:
-    given = {name: value for name, value in vars(table).items() if value is not None}
-    return {
-        _COLUMNS.get(name, name): value if isinstance(value, str) else repr(value)
-        for name, value in given.items()
-    }
+    rows = []
+    for index, table in enumerate(tables):
+        given = {name: value for name, value in vars(table).items() if value is not None}
+        cells = {
+            _COLUMNS.get(name, name): value if isinstance(value, str) else repr(value)
+            for name, value in given.items()
+        }
+        rows.append((f"object {index + 1}", cells))
+    return rows
 
 
 class MeshFolder:

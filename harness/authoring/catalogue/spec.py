@@ -81,7 +81,12 @@ def build_item(row: CatalogueRow, mesh: str, spec: BuildSpec) -> BuildItem:
         WrongUse: there is no such file.
     """
     label = row.scale if row.units is None else None
-    shape = [_surface_key(mesh), row.units, row.wall, label, row.licence, row.up_axis]
+    if mesh.startswith(BUILTIN):
+        surface = [mesh, content_hash("harness.objects.builtin")]
+    else:
+        require_file(Path(mesh), "mesh file")
+        surface = [Path(mesh).name, sha256_of(Path(mesh))]
+    shape = [surface, row.units, row.wall, label, row.licence, row.up_axis]
     common = [*shape, spec.profile, spec.seed]
     of_sense: dict[Modality, list[Any]] = {
         "audio": [MATERIALS[row.material], spec.limit, spec.most, spec.edge],
@@ -101,14 +106,6 @@ def build_item(row: CatalogueRow, mesh: str, spec: BuildSpec) -> BuildItem:
 def builder_hash(sense: Modality) -> str:
     """Of the code that builds a sense."""
     return content_hash(f"harness.authoring.{sense}.object_{sense}")
-
-
-def _surface_key(mesh: str) -> list[str]:
-    if mesh.startswith(BUILTIN):
-        return [mesh, content_hash("harness.objects.builtin")]
-    path = Path(mesh)
-    require_file(path, "mesh file")
-    return [path.name, sha256_of(path)]
 
 
 def _colours_key(mesh: str) -> list[str]:

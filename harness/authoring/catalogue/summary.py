@@ -1,6 +1,7 @@
 """What a folder of a build holds: every object with its outcome, its modes and its quality."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -41,7 +42,10 @@ def summaries(of: BuildFolder) -> list[ObjectSummary]:
 
 
 def _summary(of: BuildFolder, name: str) -> ObjectSummary:
-    record, there = read_record(of, name), _opened(of, name)
+    record = read_record(of, name)
+    there: ObjectFile | None = None
+    with suppress(TouchstoneError):
+        there = ObjectFile.open(of.object(name))
     if record is None:
         return ObjectSummary(name, "waiting", "not built yet", None, there)
     if record.built and not stands(of, record, record.key):
@@ -51,23 +55,13 @@ def _summary(of: BuildFolder, name: str) -> ObjectSummary:
     return ObjectSummary(name, record.outcome, record.reason, record, there, quality)
 
 
-def _opened(of: BuildFolder, name: str) -> ObjectFile | None:
-    try:
-        return ObjectFile.open(of.object(name))
-    except TouchstoneError:
-        return None
-
-
 def _quality(description: Description) -> dict[str, float]:
     networks = description.networks
     found: dict[str, float] = {}
     for key, (sense, _, factor) in QUALITY.items():
         for name, entry in networks.items():
-            if _sense_of(name) == sense and key in entry.measured:
+            # Touch has networks of several names.
+            of_sense = name if name in ("audio", "vision") else "touch"
+            if of_sense == sense and key in entry.measured:
                 found.setdefault(key, factor * entry.measured[key])
     return found
-
-
-def _sense_of(network: str) -> str:
-    """Touch has networks of several names."""
-    return network if network in ("audio", "vision") else "touch"

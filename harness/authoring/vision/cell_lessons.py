@@ -45,7 +45,9 @@ class CellLessons:
         )
 
     def _encoded(self, cell: int, at: IntArray) -> AnyArray:
-        place = local_places(self._grid, cell, self._lessons.points[at])
+        # -1 to 1 in a cell, and on beyond its border.
+        grid, points = self._grid, self._lessons.points[at]
+        place = np.asarray(2.0 * ((points - grid.low) / grid.cell - grid.cells[cell]) - 1.0, np.float32)
         encoded = np.empty((len(at), self._size.place), np.float32)
         encode(place, octave_factors(self._size), 0, encoded)
         return encoded
@@ -64,12 +66,6 @@ class CellLessons:
         if size.extras:
             told[:, first + size.direction :] = np.hstack([lessons.seen[at], lessons.normals[at]])
         return told
-
-
-def local_places(grid: VisionGrid, cell: int, points: FloatArray) -> AnyArray:
-    """``(n, 3)`` float32: -1 to 1 in a cell, and on beyond its border."""
-    within = 2.0 * ((points - grid.low) / grid.cell - grid.cells[cell]) - 1.0
-    return np.asarray(within, np.float32)
 
 
 def _by_cell(grid: VisionGrid, points: FloatArray, overlap: float, least: int) -> Callable[[int], IntArray]:

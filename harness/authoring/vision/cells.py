@@ -1,6 +1,5 @@
 """The tiny networks of an object, trained cell by cell; what was trained is kept and never trained again."""
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple
 from pathlib import Path
@@ -92,7 +91,10 @@ class CellTraining:
     def step_epoch(self) -> float:
         """Train the next cells; the mean of their colours' errors, as roots of linear light."""
         first = self.epoch * _AT_ONCE
-        found = by_threads(self._teach, range(first, min(first + _AT_ONCE, len(self.grid))), self.threads)
+        cells = range(first, min(first + _AT_ONCE, len(self.grid)))
+        # The compiled training lets threads run beside each other.
+        with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(self.threads) as pool:
+            found = list(pool.map(self._teach, cells))
         self.losses += found
         self.epoch += 1
         return float(np.mean(found))
@@ -139,9 +141,3 @@ class CellTraining:
             int(state >> np.uint64(1)),
         )
         return float(loss)
-
-
-def by_threads(each: Callable[[int], float], cells: range, threads: int) -> list[float]:
-    """What comes of every cell, in their order; the compiled training lets threads run beside each other."""
-    with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
-        return list(pool.map(each, cells))

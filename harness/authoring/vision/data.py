@@ -84,7 +84,10 @@ def held_out_pictures(
         )
     random = np.random.default_rng([seed, 71])
     cameras = tuple(around(mesh, way, width, height, distance) for way in sphere(count, random))
-    lights = tuple(DirectionalLight(way) for way in _facing(cameras, mesh, random))
+    # Each light is from its camera's side: a place in the dark judges nothing.
+    middle = mesh.bounds.mean(axis=0)
+    towards = np.stack([camera.eye - middle for camera in cameras])
+    lights = tuple(DirectionalLight(way) for way in uniform_about(towards, random))
     return HeldOutViews(cameras, lights, apart)
 
 
@@ -106,10 +109,3 @@ def around(mesh: Mesh, way: FloatArray, width: int, height: int, distance: float
     return Pinhole.looking_at(
         middle + distance * mesh.diagonal * way, middle, up, width, height, 2.0 * float(np.arctan(half))
     )
-
-
-def _facing(cameras: tuple[Pinhole, ...], mesh: Mesh, random: np.random.Generator) -> FloatArray:
-    """``(n, 3)`` unit: a light for each camera, from its side: what lies in the dark judges nothing."""
-    middle = mesh.bounds.mean(axis=0)
-    towards = np.stack([camera.eye - middle for camera in cameras])
-    return uniform_about(towards, random)

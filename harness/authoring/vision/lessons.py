@@ -13,13 +13,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from harness.authoring.vision.data import FACING, LEAST_YIELD, HeldOutViews
-from harness.authoring.vision.places import cosine_about, is_closed, sphere, surface_places, uniform_about
+from harness.authoring.vision.places import sphere, surface_places, uniform_about
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import OutOfDomain
-from harness.basics.mesh import Mesh
 from harness.objectfile.vision_tensors import Kind
 from harness.sim.light.direct_image import LitObject
 from harness.sim.light.lambert import Places, cosines, places_seen, radiance
+from harness.sim.solid.mesh_repair import is_watertight
 
 AHEAD = 0.25
 """Voxels before the surface at which the density begins, along the normal: what networks err by."""
@@ -91,7 +91,11 @@ def draw_lessons(
         OutOfDomain: next to nothing of the surface can be seen from outside, clear of what is kept back.
     """
     random, mesh = np.random.default_rng([seed, 74]), lit.appearance.mesh
-    both, drawn = not is_closed(mesh), 0
+    # A surface is closed where it has no border, seams of textures aside.
+    _, place_of = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    corners = place_of.reshape(-1)[mesh.faces]
+    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    both, drawn = not is_watertight(corners[whole]), 0
     parts: list[Lessons] = []
     while drawn < count or not parts:
         part = _chunk(lit, voxel, random, held_out, both, lamps)
@@ -128,13 +132,29 @@ def draw_lamps(count: int, seed: int, held_out: HeldOutViews) -> AnyArray:
 def _chunk(
     lit: LitObject, voxel: float, random: np.random.Generator, held_out: HeldOutViews, both: bool, lamps: int
 ) -> Lessons:
-    faces, weights, points, views = _looked_at(lit.appearance.mesh, random, both)
-    offsets = _offsets(random)
+    # Faces, weights, points and views are drawn as ``vision_data.draw_tuples`` does.
+    mesh = lit.appearance.mesh
+    faces, weights = surface_places(mesh, _CHUNK, random)
+    side = np.where(random.random(_CHUNK) < 0.5, -1.0, 1.0) if both else np.ones(_CHUNK)
+    normals = side[:, None] * mesh.face_normals[faces]
+    # A unit normal plus a place on the unit ball is a direction drawn with the cosine.
+    total = normals + (1.0 - 1e-6) * sphere(len(normals), random)
+    views = -(total / np.linalg.norm(total, axis=1, keepdims=True))
+    corners = mesh.corners[faces]
+    points = corners[:, 0] + np.einsum("nk,nkx->nx", weights, corners[:, 1:] - corners[:, :1])
+    # Which kind of place along the view, and where of its kind, 0 to 1.
+    offsets = random.random((_CHUNK, 2))
     clear = np.flatnonzero(held_out.clear_of_views(points, views))
     seen = clear[lit.rays.free(points[clear], -views[clear], faces[clear])] if len(clear) else clear
     places = places_seen(lit.appearance, faces[seen], weights[seen], views[seen])
     slope = np.maximum(-np.einsum("nx,nx->n", views[seen], places.flat), 1e-3)
-    along, weight = _along(offsets[seen], slope)
+    # Voxels behind the surface along the view, and how much the colour there counts: most are where rays
+    # take their colour from, some before it, some behind.
+    kind, share = offsets[seen].T
+    near = -_NEAR + (_NEAR + _BEHIND) * share
+    before = -np.minimum(_SHALLOW * share / slope, _BEFORE)
+    along = np.where(kind < 0.65, near, np.where(kind < 0.85, before, _BEHIND + 0.5 * share))
+    weight = np.where(along < -_NEAR, 0.0, np.where(along <= _BEHIND, 1.0, 0.3))
     lessons = Lessons(
         places.points + (along * voxel)[:, None] * views[seen],
         places.normals.astype(np.float32),
@@ -170,37 +190,3 @@ def _lit(
     colours = radiance(again, np.pi * cosine).astype(np.float32)
     repeated = {field.name: getattr(lessons, field.name)[at] for field in fields(Lessons)}
     return replace(Lessons(**repeated), colours=colours, lamps=ways.astype(np.float32))
-
-
-def _looked_at(
-    mesh: Mesh, random: np.random.Generator, both: bool
-) -> tuple[AnyArray, FloatArray, FloatArray, FloatArray]:
-    """Faces, weights, points and views, drawn as ``vision_data.draw_tuples`` does."""
-    faces, weights = surface_places(mesh, _CHUNK, random)
-    side = np.where(random.random(_CHUNK) < 0.5, -1.0, 1.0) if both else np.ones(_CHUNK)
-    views = -cosine_about(side[:, None] * mesh.face_normals[faces], random)
-    corners = mesh.corners[faces]
-    points = corners[:, 0] + np.einsum("nk,nkx->nx", weights, corners[:, 1:] - corners[:, :1])
-    return faces, weights, points, views
-
-
-def _offsets(random: np.random.Generator) -> FloatArray:
-    """``(n, 2)`` what kind of place along the view, and where of its kind, 0 to 1."""
-    return random.random((_CHUNK, 2))
-
-
-def _along(offsets: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Voxels behind the surface along the view, and how much the colour there counts.
-
-    Most are where rays take their colour from, some before it, some behind.
-
-    Args:
-        offsets: of ``_offsets``.
-        slope: ``(n,)`` cosine between view and face.
-    """
-    kind, share = offsets.T
-    near = -_NEAR + (_NEAR + _BEHIND) * share
-    before = -np.minimum(_SHALLOW * share / slope, _BEFORE)
-    along = np.where(kind < 0.65, near, np.where(kind < 0.85, before, _BEHIND + 0.5 * share))
-    weight = np.where(along < -_NEAR, 0.0, np.where(along <= _BEHIND, 1.0, 0.3))
-    return along, weight

@@ -4,7 +4,6 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.mesh import Mesh
-from harness.sim.solid.mesh_repair import is_watertight
 
 
 def surface_places(mesh: Mesh, count: int, random: np.random.Generator) -> tuple[IntArray, FloatArray]:
@@ -28,17 +27,3 @@ def uniform_about(normals: FloatArray, random: np.random.Generator) -> FloatArra
     drawn = sphere(len(normals), random)
     away = np.sign(np.einsum("nx,nx->n", drawn, normals))
     return np.asarray(drawn * np.where(away < 0.0, -1.0, 1.0)[:, None])
-
-
-def cosine_about(normals: FloatArray, random: np.random.Generator) -> FloatArray:
-    """A unit normal plus a place on the unit ball is a direction drawn with the cosine."""
-    total = normals + (1.0 - 1e-6) * sphere(len(normals), random)
-    return np.asarray(total / np.linalg.norm(total, axis=1, keepdims=True))
-
-
-def is_closed(mesh: Mesh) -> bool:
-    """Whether there is no border, seams of textures aside."""
-    _, place_of = np.unique(mesh.vertices, axis=0, return_inverse=True)
-    faces = place_of.reshape(-1)[mesh.faces]
-    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    return is_watertight(faces[whole])

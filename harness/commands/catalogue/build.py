@@ -1,5 +1,6 @@
 """``touchstone catalogue build``: every object of a catalogue becomes an ObjectFile."""
 
+import shutil
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -66,9 +67,10 @@ def build(
     Try: touchstone catalogue build objects.csv --meshes meshes --out built --profile smoke
     """
     options.require_folders(("--out", out), ("--stages", stages))
-    from harness.authoring.catalogue.build import build_all, build_plan, held
-    from harness.authoring.catalogue.layout import BuildFolder, write_settings
-    from harness.authoring.catalogue.worker import WorkerLimits
+    from harness.authoring.catalogue.build import build_plan, held
+    from harness.authoring.catalogue.layout import BuildFolder, BuildSettings, ExcludedEntry
+    from harness.authoring.catalogue.worker import Job, WorkerLimits
+    from harness.basics.files.json_file import write_model
     from harness.basics.quantities import TIME
 
     begun = time.perf_counter()
@@ -82,10 +84,14 @@ def build(
     plan = build_plan(rows, spec, of, retry)
     records: list[ObjectRecord] = []
     with held(of):
-        write_settings(of, catalogue, [item.row.name for item in plan.items], excluded)
+        names = tuple(item.row.name for item in plan.items)
+        entries = tuple(ExcludedEntry(name=row.name, reason=row.reason) for row in excluded)
+        write_model(BuildSettings(catalogue=str(catalogue), names=names, excluded=entries), of.settings)
         if plan.waiting:
             with build_progress(len(plan.waiting)) as count:
-                for record in build_all(plan, spec, of, chosen_runner):
+                shutil.rmtree(of.aside, ignore_errors=True)
+                of.aside.mkdir()
+                for record in chosen_runner.run(Job(item, spec, of) for item in plan.waiting):
                     records.append(record)
                     count(record.name, record.built)
                     if not record.built:

@@ -14,7 +14,6 @@ from harness.objectfile.entries import (
     AudioEntry,
     Domain,
     Input,
-    NetworkEntry,
     Provenance,
     TableEntry,
     Tensor,
@@ -64,8 +63,23 @@ def with_audio(of: ObjectFile, part: AudioPart) -> ObjectFile:
             f"{len(modes.frequencies)} modes and dampings of shape {part.dampings.shape}; one for each"
         )
     contents: dict[str, bytes] = {}
-    network = None if part.graph is None else _network(of.mesh, part, part.graph, contents)
-    table = _table(part, contents) if part.table else None
+    network = table = None
+    if part.graph is not None:
+        points, gains = network_tensors(len(modes.frequencies), part.near_surface)
+        asked = {"points": SurfaceSearch(of.mesh).spread(_SELF_TEST_POINTS)[0]}
+        measured = part.measured.get("network", {})
+        written = NetworkPart(NETWORK, part.graph, (points,), (gains,), asked, _TOLERANCE, measured)
+        network = network_entry(written, contents)
+    if part.table:
+        halves, scales = scaled(modes.shapes)
+        contents[TABLE] = table_bytes(halves)
+        contents[TABLE_SURFACE] = ply_bytes(Mesh(modes.points, modes.faces))
+        table = TableEntry(
+            **file_entry(TABLE, contents[TABLE]).model_dump(),
+            surface=file_entry(TABLE_SURFACE, contents[TABLE_SURFACE]),
+            scales=tuple(scales.tolist()),
+            measured=dict(part.measured.get("table", {})),
+        )
     described = {
         "frequencies_hz": modes.frequencies.tolist(),
         "dampings_per_s": part.dampings.tolist(),
@@ -110,24 +124,3 @@ def network_tensors(modes: int, near_surface: float) -> tuple[Input, Tensor]:
         frame="object",
     )
     return points, gains
-
-
-def _network(mesh: Mesh, part: AudioPart, graph: ModelProto, contents: dict[str, bytes]) -> NetworkEntry:
-    points, gains = network_tensors(len(part.modes.frequencies), part.near_surface)
-    asked = {"points": SurfaceSearch(mesh).spread(_SELF_TEST_POINTS)[0]}
-    measured = part.measured.get("network", {})
-    written = NetworkPart(NETWORK, graph, (points,), (gains,), asked, _TOLERANCE, measured)
-    return network_entry(written, contents)
-
-
-def _table(part: AudioPart, contents: dict[str, bytes]) -> TableEntry:
-    modes = part.modes
-    table, scales = scaled(modes.shapes)
-    contents[TABLE] = table_bytes(table)
-    contents[TABLE_SURFACE] = ply_bytes(Mesh(modes.points, modes.faces))
-    return TableEntry(
-        **file_entry(TABLE, contents[TABLE]).model_dump(),
-        surface=file_entry(TABLE_SURFACE, contents[TABLE_SURFACE]),
-        scales=tuple(scales.tolist()),
-        measured=dict(part.measured.get("table", {})),
-    )

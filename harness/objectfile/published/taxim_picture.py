@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from harness.basics.arrays import BoolArray, ByteArray, FloatArray
+from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import CalibrationRefused
 from harness.objectfile.published.touch import SEEN_DEPTH
 from harness.sim.optics.kernels import change_exactly
@@ -62,9 +62,13 @@ class TaximPicture:
         """
         height = (SEEN_DEPTH[1] - depth) / PITCH
         contact = height - self.rest > _CORE * pressed / PITCH
-        found: FloatArray = np.clip(
-            table_colours(_skirted(height, contact), self.table) + self.base, 0.0, 255.0
-        )
+        # Blurred where nothing touches, in single precision as published.
+        soft = height.astype(np.float32)
+        for width in _KERNELS:
+            soft = np.asarray(cv2.GaussianBlur(soft, (width, width), 0), np.float32)
+            soft[contact] = height[contact]
+        coloured = table_colours(soft.astype(np.float64), self.table) + self.base
+        found: FloatArray = np.clip(coloured, 0.0, 255.0)
         return found
 
     def image(self, depth: FloatArray, pressed: float) -> ByteArray:
@@ -86,12 +90,3 @@ def table_colours(height: FloatArray, table: FloatArray) -> FloatArray:
     colours = np.empty((*height.shape, 3))
     change_exactly(height, table, colours)
     return colours
-
-
-def _skirted(height: FloatArray, contact: BoolArray) -> FloatArray:
-    """Blurred where nothing touches, in single precision as published."""
-    soft = height.astype(np.float32)
-    for width in _KERNELS:
-        soft = np.asarray(cv2.GaussianBlur(soft, (width, width), 0), np.float32)
-        soft[contact] = height[contact]
-    return soft.astype(np.float64)

@@ -158,7 +158,13 @@ def open_touch(of: ObjectFile, level: TouchLevel = "codes", threads: int = 1) ->
         case "reference":
             maps = ReferenceMaps(RasterMesh(of.mesh), entry.gel)
         case "codes":
-            maps = _codes(of, coded(of), threads)
+            codes = coded(of)
+            nodes = NodeSearch(nodes_of(of, codes), codes.most_off_m)
+            # Graphs are heavy to read, and the reference needs none of it.
+            from harness.objectfile.self_test import open_network
+
+            network = open_network(of.read(codes.network), codes.network, threads, ("maps",))
+            maps = CodeMaps(network, nodes)
         case _:
             raise WrongUse(f"no level {level!r} of a touch; there is codes and reference")
     return ObjectTouch(level, entry, SurfaceSearch(of.mesh), maps)
@@ -203,12 +209,3 @@ def nodes_of(of: ObjectFile, entry: CodesEntry) -> SurfaceNodes:
         )
     require_own(SurfaceSearch(of.mesh), nodes.points, entry.nodes.file)
     return nodes
-
-
-def _codes(of: ObjectFile, entry: CodesEntry, threads: int) -> CodeMaps:
-    nodes = nodes_of(of, entry)
-    # Graphs are heavy to read, and the reference needs none of it.
-    from harness.objectfile.self_test import open_network
-
-    network = open_network(of.read(entry.network), entry.network, threads, ("maps",))
-    return CodeMaps(network, NodeSearch(nodes, entry.most_off_m))

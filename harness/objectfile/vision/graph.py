@@ -316,19 +316,15 @@ def _networks(made: _Blocks, size: NetworkSize, local: str) -> None:
     made.turned(nodes.add("Mul", raw, scale), name="density")
     matrix, seen = _seen(made, size, hidden)
     product = nodes.add("MatMul", made.of_block(matrix), seen)
-    hidden = nodes.add("Relu", nodes.add("Add", product, _lit(made, size)))
-    colour = made.layer(hidden, names["colour"], names["colour_bias"])
-    made.turned(nodes.add("Sigmoid", colour), name="scattered")
-
-
-def _lit(made: _Blocks, size: NetworkSize) -> str:
-    """What of the layer that sees directions is the same for all samples of a block."""
-    nodes, names = made.nodes, made.names
+    # What of the layer that sees directions is the same for all samples of a block.
     folded = nodes.add("MatMul", names["scatter.feature"], names["feature_bias"])
     bias = nodes.add("Add", folded, names["scatter_bias"])
     code = nodes.add("Unsqueeze", made.encoded("light", size.turns), nodes.constant(np.array([2], np.int64)))
-    product = nodes.add("MatMul", made.of_block(names["scatter.light"]), code)
-    return nodes.add("Add", product, made.of_block(bias))
+    turned = nodes.add("MatMul", made.of_block(names["scatter.light"]), code)
+    lit = nodes.add("Add", turned, made.of_block(bias))
+    hidden = nodes.add("Relu", nodes.add("Add", product, lit))
+    colour = made.layer(hidden, names["colour"], names["colour_bias"])
+    made.turned(nodes.add("Sigmoid", colour), name="scattered")
 
 
 def _seen(made: _Blocks, size: NetworkSize, hidden: str) -> tuple[str, str]:

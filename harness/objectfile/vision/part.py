@@ -8,7 +8,7 @@ import numpy as np
 from harness.basics.arrays import AnyArray
 from harness.basics.mesh import Mesh
 from harness.basics.toml_file import validate
-from harness.objectfile.entries import NetworkEntry, Provenance
+from harness.objectfile.entries import Provenance
 from harness.objectfile.file import ObjectFile, file_entry, with_part
 from harness.objectfile.network_part import NetworkPart, network_entry
 from harness.objectfile.surface_file import ply_bytes
@@ -45,7 +45,11 @@ def with_vision(of: ObjectFile, part: VisionPart) -> ObjectFile:
     model, grid, size = part.model, part.model.grid, part.model.weights.size
     grid.require_surface(of.mesh if part.surface is None else part.surface)
     contents: dict[str, bytes] = {}
-    network = _network(part, contents)
+    graph = vision_graph(model, part.block)
+    inputs, outputs = vision_tensors(grid, size, part.block)
+    asked = blocks_inside(model, _SELF_TEST_BLOCKS, part.block, np.random.default_rng(0))
+    written = NetworkPart(FILE, graph, inputs, outputs, asked, _TOLERANCE, part.measured)
+    network = network_entry(written, contents)
     surface = None
     if part.surface is not None:
         contents[SURFACE] = ply_bytes(part.surface)
@@ -68,15 +72,6 @@ def with_vision(of: ObjectFile, part: VisionPart) -> ObjectFile:
     }
     entry = validate(described, VisionEntry, f"the look of {of.description.name}")
     return with_part(of, "vision", entry, contents)
-
-
-def _network(part: VisionPart, contents: dict[str, bytes]) -> NetworkEntry:
-    graph = vision_graph(part.model, part.block)
-    inputs, outputs = vision_tensors(part.model.grid, part.model.weights.size, part.block)
-    asked = blocks_inside(part.model, _SELF_TEST_BLOCKS, part.block, np.random.default_rng(0))
-    return network_entry(
-        NetworkPart(FILE, graph, inputs, outputs, asked, _TOLERANCE, part.measured), contents
-    )
 
 
 def blocks_inside(
