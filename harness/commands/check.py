@@ -3,7 +3,7 @@
 import tempfile
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.markup import escape
@@ -12,9 +12,6 @@ from rich.table import Table
 from harness.basics.errors import SafetyStop
 from harness.commands import options
 from harness.commands.output import ANSWERS, CONSOLE, emit
-
-if TYPE_CHECKING:
-    from harness.bench.opening import Checked
 
 
 def check(
@@ -46,20 +43,15 @@ def check(
     if json:
         emit({"schema": 1, "station": station, **found.as_json()})
     else:
-        _print(found, bench_file.title or station)
+        table = Table(title=f"{bench_file.title or station}: arm {found.safety or 'not open'}")
+        for heading in ("instrument", "identity", "rate (Hz)", "drops", "latency (ms)", ""):
+            table.add_column(heading)
+        for health in found.instruments:
+            latency = "not known" if health.latency is None else f"{1e3 * health.latency:.1f}"
+            rate, drops = f"{health.rate:.1f}", str(health.drops)
+            table.add_row(health.name, health.identity, rate, drops, latency, health.detail)
+        ANSWERS.print(table)
+        for name, error in found.failures.items():
+            CONSOLE.print(f"[bold red]error:[/] {name}: {escape(str(error))}")
     unsafe = any(isinstance(error, SafetyStop) for error in found.failures.values())
     return SafetyStop.exit_code if unsafe else int(bool(found.failures))
-
-
-def _print(found: "Checked", title: str) -> None:
-    table = Table(title=f"{title}: arm {found.safety or 'not open'}")
-    for heading in ("instrument", "identity", "rate (Hz)", "drops", "latency (ms)", ""):
-        table.add_column(heading)
-    for health in found.instruments:
-        latency = "not known" if health.latency is None else f"{1e3 * health.latency:.1f}"
-        table.add_row(
-            health.name, health.identity, f"{health.rate:.1f}", str(health.drops), latency, health.detail
-        )
-    ANSWERS.print(table)
-    for name, error in found.failures.items():
-        CONSOLE.print(f"[bold red]error:[/] {name}: {escape(str(error))}")

@@ -14,7 +14,6 @@ from harness.basics.errors import WrongUse
 from harness.bench.experiments import require_experiment
 from harness.bench.named_files import named_file, require_run
 from harness.bench.scene_objectfile import (
-    holds_objectfile,
     objectfile_folder,
     require_object,
     require_objectfile,
@@ -38,15 +37,16 @@ def check_scene(path: Path | None) -> Path | None:
     return path
 
 
-def check_scene_or_object(path: Path) -> Path:
-    """Refuse what is neither a scene nor an ObjectFile."""
-    return path if holds_objectfile(objectfile_folder(str(path), Path.cwd())) else check_scene(path) or path
+def _named(parameter: typer.CallbackParam) -> str:
+    """Return the name of an option, or the metavar of an argument, for messages."""
+    option = parameter.opts[0]
+    return option if option.startswith("-") else str(parameter.metavar)
 
 
-def check_object(name: str | None) -> str | None:
-    """Refuse an ``--object`` that does not exist."""
+def check_object(parameter: typer.CallbackParam, name: str | None) -> str | None:
+    """Refuse an object that is neither a file, a built-in object nor an ObjectFile."""
     if name is not None:
-        require_object(name, Path.cwd(), "--object")
+        require_object(name, Path.cwd(), _named(parameter))
     return name
 
 
@@ -64,13 +64,6 @@ def check_mesh(name: str | None) -> str | None:
     return name
 
 
-def check_touched(name: str | None) -> str | None:
-    """Refuse a MESH to be pressed that is neither a file, a built-in object nor an ObjectFile."""
-    if name is not None:
-        require_object(name, Path.cwd(), "MESH")
-    return name
-
-
 def check_experiment(name: str | None) -> str | None:
     """Refuse an experiment that does not exist."""
     if name is not None:
@@ -85,23 +78,16 @@ def check_run(folder: Path | None) -> Path | None:
     return folder
 
 
-def find_objectfile_option(folder: Path | None) -> Path | None:
-    """Return the folder of an ``--objectfile``, as ``find_objectfile``."""
-    return None if folder is None else _existing_objectfile(folder, "--objectfile")
-
-
-def find_objectfile(folder: Path) -> Path:
+def find_objectfile(parameter: typer.CallbackParam, folder: Path | None) -> Path | None:
     """Return the folder of an ObjectFile that is named by its path, or by its name in ``objects/``.
 
     Raises:
         WrongUse: there is none.
     """
-    return _existing_objectfile(folder, "OBJECT")
-
-
-def _existing_objectfile(folder: Path, where: str) -> Path:
+    if folder is None:
+        return None
     found = objectfile_folder(str(folder), Path.cwd())
-    require_objectfile(found, where)
+    require_objectfile(found, _named(parameter))
     return found
 
 

@@ -37,24 +37,20 @@ def check(
     chosen_rows, rows, excluded = chosen.read(catalogue, meshes, material)
     for note in chosen_rows.notes:
         warn(note)
-    found = [] if rows_only else _findings(rows, "audio" in senses.split(","))
+    found = []
+    if not rows_only:
+        from harness.authoring.catalogue.findings import intake_finding
+
+        with share_progress() as report:
+            for index, (row, mesh) in enumerate(rows):
+                report(row.name, index / len(rows))
+                found.append(intake_finding(row, mesh, "audio" in senses.split(",")))
     if json:
         emit(_as_json(chosen_rows, rows, excluded, found))
     else:
         _print(chosen_rows, rows, excluded, found)
     buildable = len(rows) if rows_only else sum(finding.reason is None for finding in found)
     return 0 if buildable else 1
-
-
-def _findings(rows: "list[tuple[CatalogueRow, str]]", sound: bool) -> "list[IntakeFinding]":
-    from harness.authoring.catalogue.findings import intake_finding
-
-    found = []
-    with share_progress() as report:
-        for index, (row, mesh) in enumerate(rows):
-            report(row.name, index / len(rows))
-            found.append(intake_finding(row, mesh, sound))
-    return found
 
 
 def _as_json(

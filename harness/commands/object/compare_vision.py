@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from harness.bench.scene_camera import Lamp
     from harness.objectfile.file import ObjectFile
     from harness.objectfile.vision.render import ObjectVision
-    from harness.picture.linear_image import LinearImage
     from harness.picture.pinhole import Pinhole
 
 DEFAULT_ANGLE = "40deg"
@@ -96,8 +95,11 @@ def compare(
 
     Try: touchstone object compare vision objects/mug --live mug.jpg --camera 0.25 -0.2 0.2 --out sheet.png
     """
+    import numpy as np
+
     from harness.picture.exposure_fit import exposure_kind
     from harness.picture.image_file import read_image
+    from harness.picture.linear_image import LinearImage
     from harness.picture.live_picture import compare_live
 
     options.require_files(("--out", out, ".png"))
@@ -112,7 +114,10 @@ def compare(
     behind = None if background is None else read_image(background)
     seconds["live"] = time.perf_counter() - begun
     begun = time.perf_counter()
-    image = _lit(vision, seen)
+    # Light of all lamps, each in its colour.
+    pictures = [vision.picture(seen.camera, lamp.light).image for lamp in seen.lamps]
+    parts = [picture.colour * lamp.colour for picture, lamp in zip(pictures, seen.lamps, strict=True)]
+    image = LinearImage(np.sum(parts, axis=0), pictures[0].alpha, pictures[0].depth)
     seconds["render"] = time.perf_counter() - begun
     found = compare_live(seen.live, image, behind, kind)
     said = Compared(of, vision, seen, found, seconds)
@@ -194,14 +199,3 @@ def _lit_by(
         told = Lamp(DirectionalLight(np.array(wanted.light)), np.ones(3))
         return ComparedPhoto(live, camera, (told,), False)
     return ComparedPhoto(live, camera, known or (Lamp(light_for(camera), np.ones(3)),), not known)
-
-
-def _lit(vision: "ObjectVision", seen: ComparedPhoto) -> "LinearImage":
-    """Light of all lamps, each in its colour."""
-    import numpy as np
-
-    from harness.picture.linear_image import LinearImage
-
-    pictures = [vision.picture(seen.camera, lamp.light).image for lamp in seen.lamps]
-    parts = [image.colour * lamp.colour for image, lamp in zip(pictures, seen.lamps, strict=True)]
-    return LinearImage(np.sum(parts, axis=0), pictures[0].alpha, pictures[0].depth)

@@ -51,7 +51,16 @@ def draw(compared: Compared, out: Path) -> None:
     from harness.report.figures.tiles import live_figure
 
     begun = time.perf_counter()
-    Album(out.parent).photograph(out.stem, live_figure(compared.found, _words(compared)))
+    found = compared.found
+    fit = found.exposure
+    gains = ", ".join(f"{g:.3f}±{e:.3f}" for g, e in zip(fit.gain, fit.gain_error, strict=True))
+    offsets = ", ".join(f"{o:+.3f}±{e:.3f}" for o, e in zip(fit.offset, fit.offset_error, strict=True))
+    words = (
+        f"object found by {found.masked_by} (orange), simulated (blue)\noverlap {found.overlap:.1%}",
+        f"red, green, blue:\ngain {gains}\noffset {offsets}",
+        f"over the object: {_in_words(found.fitted)}\nbefore the fit: {_in_words(found.unfitted)}",
+    )
+    Album(out.parent).photograph(out.stem, live_figure(found, words))
     compared.seconds["draw"] = time.perf_counter() - begun
 
 
@@ -154,15 +163,3 @@ def print_answer(compared: Compared, files: Mapping[str, Path | None]) -> None:
 def _in_words(apart: "Apart") -> str:
     decibels = f"{apart.psnr_db:.1f} dB" if math.isfinite(apart.psnr_db) else "the same"
     return f"{decibels}, SSIM {apart.ssim:.3f}, {apart.rms_grey:.1f} grey levels rms"
-
-
-def _words(compared: Compared) -> tuple[str, str, str]:
-    found = compared.found
-    fit = found.exposure
-    gains = ", ".join(f"{g:.3f}±{e:.3f}" for g, e in zip(fit.gain, fit.gain_error, strict=True))
-    offsets = ", ".join(f"{o:+.3f}±{e:.3f}" for o, e in zip(fit.offset, fit.offset_error, strict=True))
-    return (
-        f"object found by {found.masked_by} (orange), simulated (blue)\noverlap {found.overlap:.1%}",
-        f"red, green, blue:\ngain {gains}\noffset {offsets}",
-        f"over the object: {_in_words(found.fitted)}\nbefore the fit: {_in_words(found.unfitted)}",
-    )

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from json import dumps
 from pathlib import Path
@@ -61,6 +61,8 @@ def vision(
     from harness.authoring.vision.profiles import vision_profile
     from harness.cost.curve import front
     from harness.cost.provenance import code, machine
+    from harness.report.figures.charts import cost_chart
+    from harness.report.figures.figures import Album
     from harness.sim.light.appearance_source import appearance_of
     from harness.sim.light.direct_image import LitObject
     from harness.sim.solid.surface_source import surface_of
@@ -73,10 +75,14 @@ def vision(
         wanted = tuple(dict.fromkeys(way.networks for way in chosen))
         for number, networks in enumerate(wanted, start=1):
             studio.train(networks, seed, out, _after(f"networks {number} of {len(wanted)}", report))
-        load, cores = _load_of_others(), threads or own_cores()
+        # Programs that ran or waited over the last minute, this one's single thread left out.
+        load = max(os.getloadavg()[0] - 1.0, 0.0) if hasattr(os, "getloadavg") else None
+        cores = threads or own_cores()
         costs = measured(chosen, studio, repeat, report)
     of_size = [each.point for each in costs if each.way.side == size]
     best = front(of_size)
+    title = f"{Path(mesh).name}, {size} x {size} pixels, {cores} threads"
+    chart = cost_chart(of_size, ("knob",), title, stale=False)
     answer = {
         "schema": 2,
         "program": "vision",
@@ -90,7 +96,7 @@ def vision(
         "repeat": repeat,
         "load": load,
         "points": [_point(each, each.point in best) for each in costs],
-        "picture": str(_drawn(of_size, f"{Path(mesh).name}, {size} x {size} pixels, {cores} threads", out)),
+        "picture": str(out / Album(out).drawing("curve", chart).file),
         "curve": str(out / "curve.json"),
     }
     write_text_whole(out / "curve.json", dumps(answer, allow_nan=False, indent=1) + "\n")
@@ -128,18 +134,6 @@ def _after(before: str, report: "Report") -> "Report":
     return lambda doing, share: report(f"{before}: {doing}", share)
 
 
-def _load_of_others() -> float | None:
-    """Programs that ran or waited over the last minute, this one's single thread left out."""
-    return max(os.getloadavg()[0] - 1.0, 0.0) if hasattr(os, "getloadavg") else None
-
-
-def _drawn(points: "Sequence[Point]", title: str, out: Path) -> Path:
-    from harness.report.figures.charts import cost_chart
-    from harness.report.figures.figures import Album
-
-    return out / Album(out).drawing("curve", cost_chart(points, ("knob",), title, stale=False)).file
-
-
 def _point(cost: "PictureCost", on_front: bool) -> dict[str, Any]:
     from harness.cost.file import summary
 
@@ -152,13 +146,9 @@ def _point(cost: "PictureCost", on_front: bool) -> dict[str, Any]:
         "rays": worth.rays,
         "networks": worth.networks,
         "file_bytes": worth.file_bytes,
-        "from_exact": _finite(worth.exact),
+        # The decibels of equal pictures are null.
+        "from_exact": {name: value if math.isfinite(value) else None for name, value in worth.exact.items()},
     }
-
-
-def _finite(errors: Mapping[str, float]) -> dict[str, float | None]:
-    """The decibels of equal pictures are null."""
-    return {name: value if math.isfinite(value) else None for name, value in errors.items()}
 
 
 def _print(costs: "Sequence[PictureCost]", best: "Sequence[Point]") -> None:

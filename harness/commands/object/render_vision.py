@@ -21,8 +21,7 @@ from harness.commands.object.vision_options import Three
 from harness.commands.output import emit
 
 if TYPE_CHECKING:
-    from harness.objectfile.file import ObjectFile
-    from harness.objectfile.vision.render import ObjectVision, RenderSettings
+    from harness.objectfile.vision.render import ObjectVision
 
 _MOST_SHEET = 2**24
 """Pixels of all pictures of a turntable."""
@@ -78,7 +77,15 @@ def render(
     begun = time.perf_counter()
     of, vision = vision_options.opened(folder, threads)
     views = _views(vision, pixels, camera, look_at, up, light, angle, turntable)
-    found = _rendered(of, vision, views, chosen, begun)
+    # The first picture, a small one, loads the compiled loops for all that follow.
+    eye, lamp = views[0]
+    width = min(eye.width, _FIRST)
+    first = eye.resized(width, max(1, round(eye.height * width / eye.width)))
+    vision.picture(first, lamp, chosen)
+    loaded, begun = time.perf_counter() - begun, time.perf_counter()
+    pictures = tuple(vision.picture(*view, chosen) for view in views)
+    seconds = {"load": loaded, "render": time.perf_counter() - begun}
+    found = RenderedLook(of, vision, views, pictures, seconds)
     write_png(out, sheet(found))
     if depth_out is not None:
         write_arrays(depth_out, [picture.image.depth for picture in found.pictures])
@@ -133,21 +140,3 @@ def _views(
         return ((camera, lamp),)
     axis = mesh.bounds.mean(axis=0) if target is None else np.array(target)
     return tuple(turned(camera, lamp, axis, -2.0 * np.pi * k / turntable) for k in range(turntable))
-
-
-def _rendered(
-    of: "ObjectFile",
-    vision: "ObjectVision",
-    views: tuple[View, ...],
-    settings: "RenderSettings",
-    begun: float,
-) -> RenderedLook:
-    # The first picture, a small one, loads the compiled loops for all that follow.
-    camera, light = views[0]
-    width = min(camera.width, _FIRST)
-    first = camera.resized(width, max(1, round(camera.height * width / camera.width)))
-    vision.picture(first, light, settings)
-    loaded, begun = time.perf_counter() - begun, time.perf_counter()
-    pictures = tuple(vision.picture(*view, settings) for view in views)
-    seconds = {"load": loaded, "render": time.perf_counter() - begun}
-    return RenderedLook(of, vision, views, pictures, seconds)

@@ -13,7 +13,6 @@ from harness.commands.output import ANSWERS, emit, warn
 if TYPE_CHECKING:
     from harness.basics.arrays import ByteArray, FloatArray
     from harness.bench.sensor import TactileSensor
-    from harness.bench.station_file import Station
     from harness.sim.gel.elastic import GelElastic
     from harness.sim.optics.depth_reading import DepthReading
     from harness.sim.optics.tactile_calibration import TactileCalibration
@@ -96,13 +95,16 @@ def depth(
 
     Try: touchstone depth press.png --background rest.png --calibration gelsight_r15_bench --picture d.png
     """
+    from harness.basics.errors import WrongUse
     from harness.basics.files.named_file import refusals_name
     from harness.basics.npz_file import write_array, write_arrays
     from harness.bench.sensor import described_sensor
     from harness.bench.station_file import load_station, station_path
     from harness.picture.image_file import read_image
+    from harness.recording.run_folder import station_calibration
     from harness.sim.optics.depth_reading import read_press
     from harness.sim.optics.inverse import DRIFTING, STEADY
+    from harness.sim.optics.lit_calibration import named_calibration
 
     options.require_files(
         ("--out", out, ".npz"), ("--picture", picture, ".png"), ("--height-out", height_out, ".npy")
@@ -112,7 +114,12 @@ def depth(
         gel: TactileSensor | None = described_sensor(sensor).sensor
     else:
         gel = None if bench is None else bench.gel.sensor
-    known = _calibration(calibration, bench)
+    if calibration is not None:
+        known = named_calibration(calibration)
+    elif bench is not None:
+        known = station_calibration(bench)
+    else:
+        raise WrongUse("say by which colours: --calibration FILE, or a --station that has one")
     gel = gel or _sensor_named_by(known)
     wanted = _wanted_force(force, thickness, gel_modulus, gel_modulus_error, gel_poisson, gel)
     rest = None if background is None else read_image(background)
@@ -161,18 +168,6 @@ def depth(
     else:
         _say(answer)
     return 0
-
-
-def _calibration(named: str | None, bench: "Station | None") -> "TactileCalibration":
-    from harness.basics.errors import WrongUse
-    from harness.recording.run_folder import station_calibration
-    from harness.sim.optics.lit_calibration import named_calibration
-
-    if named is None:
-        if bench is None:
-            raise WrongUse("say by which colours: --calibration FILE, or a --station that has one")
-        return station_calibration(bench)
-    return named_calibration(named)
 
 
 def _sensor_named_by(known: "TactileCalibration") -> "TactileSensor | None":

@@ -25,7 +25,7 @@ def touch(
         typer.Argument(
             help="A mesh file, builtin:mug and so on, or an ObjectFile; or give --height.",
             metavar="MESH",
-            callback=options.check_touched,
+            callback=options.check_object,
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="The picture, 8 bits RGB.", metavar="FILE.png")] = None,

@@ -17,7 +17,7 @@ def compare(
             help="ObjectFile of another object to compare with instead of the run's own: its folder, or "
             "the name of one that comes with the program.",
             metavar="FOLDER",
-            callback=options.find_objectfile_option,
+            callback=options.find_objectfile,
         ),
     ] = None,
     reference: Annotated[

@@ -53,8 +53,9 @@ def cost(
     Try: touchstone cost contact-localization --seeds 2 --only mug --contacts 6
     """
     options.require_folders(("--out", out))
-    from harness.basics.errors import DataRefused
+    from harness.basics.errors import DataRefused, WrongUse
     from harness.basics.files.lock_file import hold_briefly, hold_folder
+    from harness.basics.files.named_file import nearest
     from harness.basics.whole_file import make_folder
     from harness.bench.station_file import load_station, station_path
     from harness.cost.file import curve_path, load, save
@@ -68,8 +69,10 @@ def cost(
     measured = measurement_of(kind)
     out = out or Path("runs/cost") / kind.name
     scenes = _scenes(only, scene)
+    if gap not in ("default", "none"):
+        raise WrongUse(f"--gap {gap!r} is not known; {nearest(gap, ('default', 'none'))}")
     given = {"spacing": spacing, "yaw": yaw, "sense": None if sense is None else [sense]}
-    chosen = {**levels_of(measured.conditions, given, where or []), "gap": [_gap(gap)]}
+    chosen = {**levels_of(measured.conditions, given, where or []), "gap": [gap]}
     wanted = measured.cells(list(scenes), range(first_seed, first_seed + seeds), chosen)
     work = Work(
         tuple(wanted),
@@ -109,15 +112,6 @@ def cost(
     ANSWERS.print(f"curve: {path}", markup=False)
     ANSWERS.print(f"page: {page}", markup=False)
     return 0
-
-
-def _gap(name: str) -> str:
-    from harness.basics.errors import WrongUse
-    from harness.basics.files.named_file import nearest
-
-    if name not in ("default", "none"):
-        raise WrongUse(f"--gap {name!r} is not known; {nearest(name, ('default', 'none'))}")
-    return name
 
 
 def _scenes(only: list[str] | None, scene: Path | None) -> dict[str, Any]:

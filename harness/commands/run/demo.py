@@ -46,10 +46,20 @@ def demo(
 
     Try: touchstone demo shape-reconstruction
     """
+    from harness.bench.scene_objectfile import shipped_objectfiles
+
     CONSOLE.print(
         "mocked bench: a UR5e, a GelSight and the other instruments that the run reads, with a reality gap"
     )
-    folder = None if objectfile is not None else _objectfile(experiment, object_)
+    folder: Path | None = None
+    if objectfile is None and experiment != "shape-reconstruction":
+        folder = shipped_objectfiles().get(object_)
+    if folder is not None:
+        CONSOLE.print(
+            f"the object is the ObjectFile {folder}: its networks stand for finite elements and rasteriser. "
+            f"`touchstone explain {object_}` says how far off they are",
+            markup=False,
+        )
     return run(
         experiment,
         object_=f"builtin:{object_}" if folder is None else str(folder),
@@ -61,18 +71,3 @@ def demo(
         json=json,
         **_OPTIONS.get(experiment, {}),
     )
-
-
-def _objectfile(experiment: str, name: str) -> Path | None:
-    """The folder of the object's own ObjectFile, and a line that says so; None where the run takes a mesh."""
-    from harness.bench.scene_objectfile import shipped_objectfiles
-
-    folder = shipped_objectfiles().get(name)
-    if folder is None or experiment == "shape-reconstruction":
-        return None
-    CONSOLE.print(
-        f"the object is the ObjectFile {folder}: its networks stand for finite elements and rasteriser. "
-        f"`touchstone explain {name}` says how far off they are",
-        markup=False,
-    )
-    return folder

@@ -113,26 +113,27 @@ def tables(
     failed = sum("failed" in result for result in results.values())
     conditions = sorted({key_of(cell) for cell, result in results.items() if "rows" in result})
     if json:
-        objects_ = [_by_object(results, key, by_object, measured.per_object) for key in conditions]
-        rows_ = [plain_row(row) for row in table]
+        values = dict.fromkeys(("error_m", *measured.per_object))
+        objects_ = [
+            {**dict(key), **{f"mean_{value}": by_object(results, key, value) for value in values}}
+            for key in conditions
+        ]
+        trees = [asdict(row) for row in table]
+        rows_ = [{**tree.pop("conditions"), **tree.pop("means"), **tree} for tree in trees]
         emit({"schema": 1, "runs": len(results), "failed": failed, "rows": rows_, "by_object": objects_})
         return 0
     print_table(table, measured.columns)
     for key in conditions:
         for value in measured.per_object:
             print_by_object(key, value, by_object(results, key, value), [row.method for row in table])
-    print_published(measured.published)
+    if measured.published:
+        said = "; ".join(
+            f"{name}: {', '.join(f'{v:g}' for v in quoted)}" for name, quoted in measured.published.items()
+        )
+        ANSWERS.print(f"the paper (ObjectFolder 2.0, other objects, mean error in cm): {said}", markup=False)
     if failed:
         warn(f"{failed} of {len(results)} runs could not be planned or performed; they are not in the table")
     return 0
-
-
-def _by_object(results: Any, key: Any, mean_of: Any, values: Any) -> dict[str, Any]:
-    """Means of one condition on each object: of the error, and of what else the experiment prints so."""
-    return {
-        **dict(key),
-        **{f"mean_{value}": mean_of(results, key, value) for value in dict.fromkeys(("error_m", *values))},
-    }
 
 
 _HEADINGS = ("method", "median", "mean", "gross", "refused", "answered", "modulo symmetry", "region", "s")
@@ -140,12 +141,6 @@ _GAPS = {"default": "on", "none": "off"}
 """Of gaps, in a title."""
 
 _SCALES = {"mm": 1e3, "%": 100.0}
-
-
-def plain_row(row: "TableRow") -> dict[str, Any]:
-    """A row as JSON values, its conditions and further means by their names."""
-    tree = asdict(row)
-    return {**tree.pop("conditions"), **tree.pop("means"), **tree}
 
 
 def print_table(table: Sequence["TableRow"], columns: Sequence["MeasuredColumn"] = ()) -> None:
@@ -185,15 +180,6 @@ def print_by_object(
         if any(one is not None for one in found):
             drawn.add_row(method, *("" if one is None else f"{1e3 * one:.1f}" for one in found))
     ANSWERS.print(drawn)
-
-
-def print_published(published: Mapping[str, Sequence[float]]) -> None:
-    """What others printed, for the foot; nothing where nobody did."""
-    if published:
-        said = "; ".join(
-            f"{name}: {', '.join(f'{v:g}' for v in values)}" for name, values in published.items()
-        )
-        ANSWERS.print(f"the paper (ObjectFolder 2.0, other objects, mean error in cm): {said}", markup=False)
 
 
 def _said(condition: "Key") -> str:

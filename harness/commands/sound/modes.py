@@ -87,9 +87,13 @@ def modes(
     """
     from harness.basics.quantities import FREQUENCY, LENGTH
     from harness.basics.store import Store, default_folder
+    from harness.objects.builtin import BUILTIN, MATERIALS
     from harness.sim.modal.file import modes_of_file
 
-    of = _material(material or _own_material(mesh), young, poisson, density, alpha, beta)
+    if not material:
+        # One of our own objects is of its own material; a file states none.
+        material = MATERIALS.get(mesh.removeprefix(BUILTIN)) if mesh.startswith(BUILTIN) else None
+    of = _material(material, young, poisson, density, alpha, beta)
     found = modes_of_file(
         mesh,
         of,
@@ -110,13 +114,6 @@ def modes(
         return 0
     emit(_as_json(Path(mesh).name, found, of, count))
     return 0
-
-
-def _own_material(mesh: str) -> str | None:
-    """What one of our own objects is made of; None of a file."""
-    from harness.objects.builtin import BUILTIN, MATERIALS
-
-    return MATERIALS.get(mesh.removeprefix(BUILTIN)) if mesh.startswith(BUILTIN) else None
 
 
 def _material(
