@@ -378,29 +378,23 @@ def train_field(bench: ViewBench, spec: FieldSpec, report: Report) -> bytes:
     for step in range(spec.steps):
         set_rate(adam, spec.rate, step / spec.steps)
         adam.zero_grad()
-        torch.autograd.backward(_loss(network, rows, spec, random))
+        at = random.integers(len(rows.points), size=spec.batch)
+        away = random.integers(_SPACE, size=spec.batch // 2)
+        lessons = rows.lessons
+        raw, logits = network(rows.points[at], lessons.views[at], lessons.lamps[at])
+        wanted = torch.from_numpy(np.float32(rows.shown[at]))
+        wrong = ((0.5 + 0.5 * _STRETCH * torch.tanh(0.5 * raw) - wanted) ** 2).mean(dim=1)
+        weight = torch.from_numpy(lessons.weight[at])
+        inside = np.concatenate([lessons.depth[at] > 0.0, rows.inside[away]])
+        every = torch.cat([logits, network.within(rows.space[away])])
+        # Squared error of colours where they count, and cross entropy of being within the object.
+        entropy = nn.functional.binary_cross_entropy_with_logits(every, torch.from_numpy(np.float32(inside)))
+        torch.autograd.backward((wrong * weight).mean() + spec.opacity * entropy)
         adam.step()
         report("vision: training 1.0's field", (step + 1) / spec.steps)
     inputs, outputs = osf_tensors(REACH)
     doc = "A place, a view and a light to raw colour and density, as in 1.0."
     return exported_graph(network.to_published(spec), inputs, outputs, doc).SerializeToString()
-
-
-def _loss(network: OsfField, rows: FieldRows, spec: FieldSpec, random: np.random.Generator) -> Tensor:
-    """Squared error of colours where they count, and cross entropy of being within the object."""
-    at, away = (
-        random.integers(len(rows.points), size=spec.batch),
-        random.integers(_SPACE, size=spec.batch // 2),
-    )
-    lessons = rows.lessons
-    raw, logits = network(rows.points[at], lessons.views[at], lessons.lamps[at])
-    wanted = torch.from_numpy(np.float32(rows.shown[at]))
-    wrong = ((0.5 + 0.5 * _STRETCH * torch.tanh(0.5 * raw) - wanted) ** 2).mean(dim=1)
-    weight = torch.from_numpy(lessons.weight[at])
-    inside = np.concatenate([lessons.depth[at] > 0.0, rows.inside[away]])
-    every = torch.cat([logits, network.within(rows.space[away])])
-    entropy = nn.functional.binary_cross_entropy_with_logits(every, torch.from_numpy(np.float32(inside)))
-    return (wrong * weight).mean() + spec.opacity * entropy
 
 
 _CHUNK = 4096

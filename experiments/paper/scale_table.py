@@ -109,7 +109,15 @@ def run_cell(
             pictures = look_pictures(record) or pictures
         true = float(truth.differences["longest_side_m"])
         rows = _rows(answering, answering.answer(), true)
-        rows.update(_paper_rows(networks, answering, pictures, true))
+        # What the paper's networks answer from the same readings.
+        camera = answering.model.station.camera
+        focal_px = 0.0 if camera is None else camera.focal_length
+        readings = PaperReadings(pictures, focal_px, answering.strikes, answering.patches)
+        for name, (size, seconds) in paper_sizes(networks, readings).items():
+            if isinstance(size, FitRefused):
+                rows[name] = _refused(size, answering, true, seconds)
+            else:
+                rows[name] = _value(size, true, seconds)
         return {"schema": 1, "cell": vars(cell), "steps": recording.committed, "size_m": true, "rows": rows}
 
 
@@ -169,25 +177,6 @@ def _shapeless_rows(answering: ScaleAnswering, found: SizeAnswer, true: float) -
     for sense, one in found.by_sense.items():
         rows[f"{sense}, shape unknown"] = _answered(one, answering, true, found.seconds[sense])
     rows["fused, shape unknown"] = _belief(found.fused, true, sum(found.seconds.values()))
-    return rows
-
-
-def _paper_rows(
-    networks: Mapping[str, PaperNetwork],
-    answering: ScaleAnswering,
-    pictures: tuple[ByteArray, ByteArray] | None,
-    true: float,
-) -> dict[str, Any]:
-    """What the paper's networks answer from the same readings."""
-    camera = answering.model.station.camera
-    focal_px = 0.0 if camera is None else camera.focal_length
-    readings = PaperReadings(pictures, focal_px, answering.strikes, answering.patches)
-    rows = {}
-    for name, (size, seconds) in paper_sizes(networks, readings).items():
-        if isinstance(size, FitRefused):
-            rows[name] = _refused(size, answering, true, seconds)
-        else:
-            rows[name] = _value(size, true, seconds)
     return rows
 
 

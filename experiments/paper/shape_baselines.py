@@ -143,9 +143,20 @@ def by_visual_hull(evidence: ShapeEvidence) -> ShapeEstimate:
         )
     reach = evidence.largest / np.sqrt(2.0) + 3.0 * evidence.place_error
     low, high = np.array([-reach, -reach, 0.0]), np.array([reach, reach, evidence.largest])
-    coarse = Grid.over(low, high, _COARSE)
-    within = _depth_range(silhouette, coarse.points)
-    left = coarse.points[_visual_field(evidence, silhouette, coarse.points, within) <= _COARSE]
+    points = Grid.over(low, high, _COARSE).points
+    # The object is as deep along the horizontal direction of sight as it is wide: from where its lowest rays
+    # meet the support.
+    sight = silhouette.look.stand_from_camera[:3, 2] * np.array([1.0, 1.0, 0.0])
+    length = float(np.linalg.norm(sight))
+    sight = sight / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
+    near, far = -np.inf, np.inf
+    ground = points[(points[:, 2] < _COARSE) & (silhouette.outside_pixels(points) < 0.0)]
+    if len(ground):
+        least = float((ground @ sight).min())
+        across = np.array([-sight[1], sight[0], 0.0])
+        near, far = least - _COARSE, least + float(np.ptp(ground @ across)) + _COARSE
+    within = sight, near, far
+    left = points[_visual_field(evidence, silhouette, points, within) <= _COARSE]
     if len(left) == 0:
         raise FitRefused(
             f"within {reach:.2f} m of where the object should stand nothing fits its silhouette; check the "
@@ -157,22 +168,6 @@ def by_visual_hull(evidence: ShapeEvidence) -> ShapeEstimate:
     body = fine.surface(_visual_field(evidence, silhouette, fine.points, within), touched)
     found = _with_deviation(evidence, samples, silhouette, body.mesh, "visual hull", start)
     return replace(found, flags=body.notes)
-
-
-def _depth_range(silhouette: Silhouette, points: FloatArray) -> tuple[FloatArray, float, float]:
-    """Horizontal direction of sight, and the distances along it between which the object is, m.
-
-    From where its lowest rays meet the support, as much farther as it is wide there.
-    """
-    sight = silhouette.look.stand_from_camera[:3, 2] * np.array([1.0, 1.0, 0.0])
-    length = float(np.linalg.norm(sight))
-    sight = sight / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
-    ground = points[(points[:, 2] < _COARSE) & (silhouette.outside_pixels(points) < 0.0)]
-    if len(ground) == 0:
-        return sight, -np.inf, np.inf
-    near = float((ground @ sight).min())
-    across = np.array([-sight[1], sight[0], 0.0])
-    return sight, near - _COARSE, near + float(np.ptp(ground @ across)) + _COARSE
 
 
 def _visual_field(

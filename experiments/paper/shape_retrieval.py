@@ -315,7 +315,18 @@ def by_retrieval(evidence: ShapeEvidence, library: Sequence[LibraryShape]) -> Sh
     ranked = sorted(
         (fit_pose(shape, samples, evidence, silhouette) for shape in library), key=lambda one: one.cost
     )[:KEPT]
-    mesh = _bend(ranked[0].mesh, samples)
+    mesh = ranked[0].mesh
+    # Move it by a Gaussian process through its distances to the contacts; never below the support.
+    places, _ = NearestSurface(mesh).places(samples.points)
+    off = samples.points - places
+    near = np.linalg.norm(off, axis=1) < FARTHEST
+    if near.any():
+        places, off, sigmas = places[near], off[near], samples.sigmas[near]
+        total = _covariance(places, places) + np.diag((sigmas / DIFFERS) ** 2)
+        forces = cho_solve(cho_factor(total, lower=True), off)
+        vertices = mesh.vertices + _covariance(mesh.vertices, places) @ forces
+        vertices[:, 2] = np.maximum(vertices[:, 2], np.minimum(mesh.vertices[:, 2], 0.0))
+        mesh = Mesh(vertices, mesh.faces)
     known = known_by(mesh, samples, silhouette)
     sides = limited_sides(mesh, samples, silhouette)
     # The root mean square distance to the other shapes, weighted by their fit.
@@ -338,21 +349,6 @@ def by_retrieval(evidence: ShapeEvidence, library: Sequence[LibraryShape]) -> Sh
             "shapes": [{"name": one.shape.name, "size_m": one.size, "cost": one.cost} for one in ranked],
         },
     )
-
-
-def _bend(mesh: Mesh, samples: ContactSamples) -> Mesh:
-    """Move a mesh by a Gaussian process through its distances to the contacts; never below the support."""
-    places, _ = NearestSurface(mesh).places(samples.points)
-    off = samples.points - places
-    near = np.linalg.norm(off, axis=1) < FARTHEST
-    if not near.any():
-        return mesh
-    places, off, sigmas = places[near], off[near], samples.sigmas[near]
-    total = _covariance(places, places) + np.diag((sigmas / DIFFERS) ** 2)
-    weights = cho_solve(cho_factor(total, lower=True), off)
-    vertices = mesh.vertices + _covariance(mesh.vertices, places) @ weights
-    vertices[:, 2] = np.maximum(vertices[:, 2], np.minimum(mesh.vertices[:, 2], 0.0))
-    return Mesh(vertices, mesh.faces)
 
 
 def _covariance(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
+from experiments.shape_reconstruction.evidence import ShapeEvidence
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.mesh import Mesh
@@ -38,8 +38,28 @@ def require_stated_space(evidence: ShapeEvidence) -> None:
         FitRefused: the silhouette, or a contact, is too far from the stated place, or two contacts are
             farther apart than the stated size allows.
     """
-    if evidence.look is not None and evidence.look.mask.any():
-        _require_outline(evidence, evidence.look)
+    look = evidence.look
+    if look is not None and look.mask.any():
+        # Compare the place where the filled silhouette meets the support with the stated place.
+        rows, columns = np.nonzero(look.mask)
+        height, width = look.mask.shape
+        pixels = np.column_stack([columns + 0.5 - 0.5 * width, rows + 0.5 - 0.5 * height]) / look.focal_length
+        rays = np.column_stack([pixels, np.ones(len(pixels))]) @ look.stand_from_camera[:3, :3].T
+        eye = look.stand_from_camera[:3, 3]
+        down, away = rays[:, 2] < -_HORIZON, _FAR
+        if eye[2] > 0.0 and down.any():
+            feet = eye[:2] - (eye[2] / rays[down, 2])[:, None] * rays[down, :2]
+            away = min(float(np.linalg.norm(feet, axis=1).min()), _FAR)
+        limit = max_offset(evidence)
+        if away > limit:
+            seen = (
+                "above the horizon" if away >= _FAR else f"{away:.2f} m from the stated place at the nearest"
+            )
+            raise FitRefused(
+                f"in the picture the object stands {seen}; with [shape] place_error "
+                f"{evidence.place_error * 1e3:g} mm and largest {evidence.largest:g} m it must be within "
+                f"{limit:.2f} m; correct object.pose.position or these two, or check the camera's pose"
+            )
     if not evidence.contacts:
         return
     points = np.concatenate([touch.points for touch in evidence.contacts])
@@ -89,24 +109,3 @@ def longest_side(points: FloatArray) -> float:
     across = points[:, :2] @ np.array([-np.sin(yaws), np.cos(yaws)])
     level = np.maximum(np.ptp(turned, axis=0), np.ptp(across, axis=0)).min()
     return float(max(level, np.ptp(points[:, 2])))
-
-
-def _require_outline(evidence: ShapeEvidence, look: SeenMask) -> None:
-    """Compare the place where the filled silhouette meets the support with the stated place."""
-    rows, columns = np.nonzero(look.mask)
-    height, width = look.mask.shape
-    pixels = np.column_stack([columns + 0.5 - 0.5 * width, rows + 0.5 - 0.5 * height]) / look.focal_length
-    rays = np.column_stack([pixels, np.ones(len(pixels))]) @ look.stand_from_camera[:3, :3].T
-    eye = look.stand_from_camera[:3, 3]
-    down, off = rays[:, 2] < -_HORIZON, _FAR
-    if eye[2] > 0.0 and down.any():
-        feet = eye[:2] - (eye[2] / rays[down, 2])[:, None] * rays[down, :2]
-        off = min(float(np.linalg.norm(feet, axis=1).min()), _FAR)
-    limit = max_offset(evidence)
-    if off > limit:
-        seen = "above the horizon" if off >= _FAR else f"{off:.2f} m from the stated place at the nearest"
-        raise FitRefused(
-            f"in the picture the object stands {seen}; with [shape] place_error "
-            f"{evidence.place_error * 1e3:g} mm and largest {evidence.largest:g} m it must be within "
-            f"{limit:.2f} m; correct object.pose.position or these two, or check the camera's pose"
-        )
