@@ -242,19 +242,18 @@ class AudioEntry(Entry):
         if self.network is None and self.table is None:
             raise ValueError("there is neither a network nor a table")
         if self.network is not None:
-            _check_audio(self.network, modes, self.near_surface_m)
+            taken = [(tensor.name, tensor.dtype, tensor.shape) for tensor in self.network.inputs]
+            given = [(tensor.name, tensor.dtype, tensor.shape) for tensor in self.network.outputs]
+            wanted = [("points", "float64", ("n", 3))], [("gains", "float32", ("n", modes, 3))]
+            if (taken, given) != wanted:
+                raise ValueError(
+                    f"its network takes {taken} and gives {given}, where sound is float64 points (n, 3) "
+                    f"to float32 gains (n, {modes}, 3)"
+                )
+            if self.network.inputs[0].domain.near_surface_m != self.near_surface_m:
+                raise ValueError(
+                    f"the domain of its network's points must say near_surface_m = {self.near_surface_m}"
+                )
         if self.table is not None and len(self.table.scales) != modes:
             raise ValueError(f"{modes} frequencies and {len(self.table.scales)} scales of the table")
         return self
-
-
-def _check_audio(network: NetworkEntry, modes: int, near_surface: float) -> None:
-    taken = [(tensor.name, tensor.dtype, tensor.shape) for tensor in network.inputs]
-    given = [(tensor.name, tensor.dtype, tensor.shape) for tensor in network.outputs]
-    if taken != [("points", "float64", ("n", 3))] or given != [("gains", "float32", ("n", modes, 3))]:
-        raise ValueError(
-            f"its network takes {taken} and gives {given}, where sound is float64 points (n, 3) "
-            f"to float32 gains (n, {modes}, 3)"
-        )
-    if network.inputs[0].domain.near_surface_m != near_surface:
-        raise ValueError(f"the domain of its network's points must say near_surface_m = {near_surface}")

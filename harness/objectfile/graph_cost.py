@@ -118,7 +118,11 @@ def query_cost(model: ModelProto, name: str) -> GraphCost:
 
 
 def _counted(graph: GraphProto, values: _Values, name: str) -> GraphCost:
-    constants = _constants(graph)
+    # Names of the values that do not depend on a query.
+    constants = {tensor.name for tensor in graph.initializer} - {value.name for value in graph.input} | {""}
+    for node in graph.node:
+        if all(value in constants for value in node.input):
+            constants.update(node.output)
     last_use = {value: index for index, node in enumerate(graph.node) for value in node.input}
     outputs = {value.name for value in graph.output}
     constant_bytes = constant_work = live = peak = work = 0
@@ -194,15 +198,6 @@ def _without_weights(model: ModelProto) -> ModelProto:
     for value in skeleton.graph.output:  # what a file claims of its results is not what they are
         value.type.tensor_type.ClearField("shape")
     return skeleton
-
-
-def _constants(graph: GraphProto) -> set[str]:
-    """Names of the values that do not depend on a query."""
-    found = {tensor.name for tensor in graph.initializer} - {value.name for value in graph.input} | {""}
-    for node in graph.node:
-        if all(value in found for value in node.input):
-            found.update(node.output)
-    return found
 
 
 def _values(skeleton: ModelProto, rows: int, name: str) -> dict[str, _Value]:

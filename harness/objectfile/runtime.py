@@ -55,7 +55,17 @@ class Network:
             data = with_outputs(model, only)
         self._cost = query_cost(model, name)
         self.name, self.inputs, self.outputs = name, tuple(inputs), tuple(outputs)
-        self._session = _session(data, name, threads)
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = threads
+        options.inter_op_num_threads = 1
+        options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
+        options.log_severity_level = _FATAL
+        # A thread that waits by spinning takes a core from the bench.
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+        try:
+            self._session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+        except Exception as error:
+            raise _failed(name, error) from error
 
     def __call__(self, inputs: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
         """The outputs by name; of no queries, outputs of none.
@@ -81,20 +91,6 @@ class Network:
         """Whether every input is there, in its shape, for no queries."""
         wanted = {tensor.name: _of_none(tensor) for tensor in self.inputs}
         return {name: array.shape for name, array in inputs.items()} == wanted
-
-
-def _session(data: bytes, name: str, threads: int) -> "onnxruntime.InferenceSession":
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads
-    options.inter_op_num_threads = 1
-    options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
-    options.log_severity_level = _FATAL
-    # A thread that waits by spinning takes a core from the bench.
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    try:
-        return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
-    except Exception as error:
-        raise _failed(name, error) from error
 
 
 def _of_none(tensor: Tensor) -> tuple[int, ...]:

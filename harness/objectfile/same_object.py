@@ -37,8 +37,15 @@ def require_same(of: ObjectFile, surface: Mesh, material: Material) -> None:
         WrongUse: another size, place, shape, volume or material; each difference is said.
         DataRefused: its mesh is damaged.
     """
-    different = [*_materials(of.material, material), *_surfaces(of, surface)]
-    _refuse(of, different, "sound.shapes = elements")
+    different = []
+    # Alpha and beta count: the decays of a scene's sounds are those of its material.
+    pairs = zip(_CONSTANTS, astuple(of.material)[1:], astuple(material)[1:], strict=True)
+    for (name, unit), a, b in pairs:
+        if abs(a - b) > _CONSTANT * max(abs(a), abs(b)):
+            different.append(
+                f"its {name} is {a:.6g}{unit} where the scene's {material.name} has {b:.6g}{unit}"
+            )
+    _refuse(of, [*different, *_surfaces(of, surface)], "sound.shapes = elements")
 
 
 def require_same_shape(of: ObjectFile, surface: Mesh, instead: str) -> None:
@@ -68,16 +75,6 @@ def _refuse(of: ObjectFile, different: list[str], instead: str) -> None:
             f"{of.folder} is not of the scene's object: {'; '.join(different)}. Name its own ObjectFile, "
             f"build one with `touchstone object build`, or take {instead}"
         )
-
-
-def _materials(there: Material, here: Material) -> list[str]:
-    """Alpha and beta count: the decays of a scene's sounds are those of its material."""
-    said = []
-    pairs = zip(_CONSTANTS, astuple(there)[1:], astuple(here)[1:], strict=True)
-    for (name, unit), a, b in pairs:
-        if abs(a - b) > _CONSTANT * max(abs(a), abs(b)):
-            said.append(f"its {name} is {a:.6g}{unit} where the scene's {here.name} has {b:.6g}{unit}")
-    return said
 
 
 def _surfaces(of: ObjectFile, surface: Mesh) -> list[str]:

@@ -171,10 +171,17 @@ def solve_readout(
         shares: ``(k,)``: what an error of each sample is multiplied by (``error_shares``).
         storage: of the weights in the file, whose rounding counts when the ridge is chosen.
     """
-    gram, right = _products(features, points, targets, shares)
+    products: FloatArray | float = 0.0
+    right: FloatArray | float = 0.0
+    for first in range(0, len(points), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        weighted = np.asarray(features(points[part]), np.float64) * shares[part, None]
+        products = products + weighted.T @ weighted
+        right = right + weighted.T @ (targets[part] * shares[part, None])
+    gram = np.asarray(products)
     values, vectors = np.linalg.eigh(gram)
     values = np.maximum(values, 0.0)
-    turned = vectors.T @ right
+    turned = vectors.T @ np.asarray(right)
     judged = measured[:: max(1, len(measured) // _JUDGED)]
     seen = np.asarray(features(points[judged]), np.float64)
     rotated = (seen * shares[judged, None]) @ vectors
@@ -204,16 +211,3 @@ def error_shares(targets: FloatArray) -> FloatArray:
     floor = 1e-3 * np.sqrt((norms**2).mean())
     shares: FloatArray = 1.0 / np.maximum(norms, floor if floor > 0.0 else 1.0)
     return shares
-
-
-def _products(
-    features: Features, points: FloatArray, targets: FloatArray, shares: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    gram: FloatArray | float = 0.0
-    right: FloatArray | float = 0.0
-    for first in range(0, len(points), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        seen = np.asarray(features(points[part]), np.float64) * shares[part, None]
-        gram = gram + seen.T @ seen
-        right = right + seen.T @ (targets[part] * shares[part, None])
-    return np.asarray(gram), np.asarray(right)

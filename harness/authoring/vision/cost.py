@@ -17,7 +17,6 @@ from harness.authoring.vision.data import HeldOutViews
 from harness.authoring.vision.metrics import BEHIND, picture_errors, reference_pictures
 from harness.authoring.vision.profiles import CellsSpec
 from harness.authoring.vision.vision import networks_alone
-from harness.basics.arrays import FloatArray
 from harness.basics.store import digest
 from harness.basics.whole_file import write_bytes_whole
 from harness.cost.curve import ErrorUnit, Point, Sample
@@ -180,7 +179,16 @@ def measured(asked: Sequence[Way], studio: Studio, repeat: int, report: Report) 
     for turn in range(repeat):
         report("timing", 0.5 + 0.5 * turn / repeat)
         taken.append([_seconds(studio, way) for way in asked])
-    return tuple(map(_cost, asked, worth, np.median(taken, axis=0)))
+    costs = []
+    for way, known, seconds in zip(asked, worth, np.median(taken, axis=0), strict=True):
+        samples = tuple(
+            Sample(f"view {view + 1}", "", error, None, 0.0, *seconds[view].tolist())
+            for view, error in enumerate(known.errors)
+        )
+        name = way.knob if way.knob == DEFAULT else f"{way.knob}: {way.level}"
+        levels, condition = {"knob": way.knob, "level": way.level}, {"side, pixels": way.side}
+        costs.append(PictureCost(way, known, Point(name, levels, condition, samples, GREY)))
+    return tuple(costs)
 
 
 def _seconds(studio: Studio, way: Way) -> list[tuple[float, float]]:
@@ -192,13 +200,3 @@ def _seconds(studio: Studio, way: Way) -> list[tuple[float, float]]:
         renderer.render(camera, light, way.settings)
         found.append((time.process_time() - cpu, time.perf_counter() - wall))
     return found
-
-
-def _cost(way: Way, worth: Worth, seconds: FloatArray) -> PictureCost:
-    samples = tuple(
-        Sample(f"view {view + 1}", "", error, None, 0.0, *seconds[view].tolist())
-        for view, error in enumerate(worth.errors)
-    )
-    name = way.knob if way.knob == DEFAULT else f"{way.knob}: {way.level}"
-    levels, condition = {"knob": way.knob, "level": way.level}, {"side, pixels": way.side}
-    return PictureCost(way, worth, Point(name, levels, condition, samples, GREY))

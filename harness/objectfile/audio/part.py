@@ -9,7 +9,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
 from harness.basics.toml_file import validate
-from harness.objectfile.audio.table import scaled, table_bytes
+from harness.objectfile.audio.table import scaled
 from harness.objectfile.entries import (
     AudioEntry,
     Domain,
@@ -20,6 +20,7 @@ from harness.objectfile.entries import (
 )
 from harness.objectfile.file import ObjectFile, file_entry, with_part
 from harness.objectfile.network_part import NetworkPart, network_entry
+from harness.objectfile.npy_file import npy_bytes
 from harness.objectfile.surface_file import ply_bytes
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.sim.modal.modes import Modes
@@ -72,7 +73,7 @@ def with_audio(of: ObjectFile, part: AudioPart) -> ObjectFile:
         network = network_entry(written, contents)
     if part.table:
         halves, scales = scaled(modes.shapes)
-        contents[TABLE] = table_bytes(halves)
+        contents[TABLE] = npy_bytes(halves, "<f2")
         contents[TABLE_SURFACE] = ply_bytes(Mesh(modes.points, modes.faces))
         table = TableEntry(
             **file_entry(TABLE, contents[TABLE]).model_dump(),

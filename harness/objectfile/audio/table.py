@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from harness.basics.arrays import AnyArray, FloatArray, IntArray, read_only
 from harness.basics.errors import DataRefused
-from harness.objectfile.npy_file import npy_array, npy_bytes
+from harness.objectfile.npy_file import npy_array
 
 HalfArray = npt.NDArray[np.float16]
 
@@ -20,11 +20,6 @@ def scaled(shapes: FloatArray) -> tuple[HalfArray, FloatArray]:
     greatest = np.abs(shapes).max(axis=(0, 2))
     scales = np.where(greatest > 0.0, greatest, 1.0)
     return (shapes / scales[:, None]).astype("<f2"), scales
-
-
-def table_bytes(table: HalfArray) -> bytes:
-    """The table as a file."""
-    return npy_bytes(table, "<f2")
 
 
 def table_from(data: bytes, name: str, shape: tuple[int, int, int]) -> HalfArray:

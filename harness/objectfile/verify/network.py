@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused
-from harness.objectfile.entries import Domain, Input, NetworkEntry, SelfTest, Tensor
+from harness.objectfile.entries import Input, NetworkEntry, SelfTest, Tensor
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.published.entries import PublishedObject
 from harness.objectfile.runtime import Network
@@ -98,18 +98,14 @@ def _queries(of: ObjectFile | PublishedObject, item: Input, random: np.random.Ge
         places, normals = SurfaceSearch(of.mesh).spread(count)
         lifts = domain.near_surface_m * (2.0 * shares[:, :1] - 1.0)
         return np.asarray((places + lifts * normals).astype(item.dtype))
-    queries = _between(domain, shares, item.name)
-    return np.asarray(queries.reshape(_shape(item, count)).astype(item.dtype))
-
-
-def _between(domain: Domain, shares: FloatArray, name: str) -> FloatArray:
     low, high = np.array(domain.low, np.float64), np.array(domain.high, np.float64)
     if low.size != shares.shape[1]:
         raise DataRefused(
-            f"the domain of {name!r} has {low.size} numbers for queries of {shares.shape[1]}; build it again"
+            f"the domain of {item.name!r} has {low.size} numbers for queries of {shares.shape[1]}; build it "
+            "again"
         )
-    inside: FloatArray = low + shares * (high - low)
-    return inside
+    queries = low + shares * (high - low)
+    return np.asarray(queries.reshape(_shape(item, count)).astype(item.dtype))
 
 
 def _shape(tensor: Tensor, rows: int) -> tuple[int, ...]:

@@ -18,7 +18,6 @@ numbers are kept once.
 A network that there is not must be left out before: onnxruntime takes -1 for the last one without a word.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,7 +84,14 @@ class VisionNetworks:
         try:
             self.grid = VisionGrid(held["low"], held["cell"].item(), held["cells"].reshape(-1, 3))
             self.density_scale: float = held["density_scale"].item()
-            self.size = _size(held, "osf-v" if "extras" in taken else "osf")
+            kind: Kind = "osf-v" if "extras" in taken else "osf"
+            place, wide = held[f"{_WEIGHTS}first"].shape[1:]
+            # ``scatter`` may be whole, as older files have it.
+            if f"{_WEIGHTS}scatter" in held:
+                direction = (held[f"{_WEIGHTS}scatter"].shape[1] - wide - EXTRAS[kind]) // 2
+            else:
+                direction = held[f"{_WEIGHTS}scatter.light"].shape[1]
+            self.size = NetworkSize(wide, (place - 3) // 6, (direction - 3) // 6, kind)
         except (KeyError, WrongUse, IndexError, ValueError, TypeError) as error:
             raise DataRefused(f"{name} holds networks that do not fit together; build it again") from error
         block = taken["points"][1][1]
@@ -170,16 +176,6 @@ def vision_tensors(
     """
     (a, b, c), (d, e, f) = grid.low.tolist(), grid.high.tolist()
     return box_tensors(len(grid), ((a, b, c), (d, e, f)), size.extras, block)
-
-
-def _size(held: Mapping[str, AnyArray], kind: Kind) -> NetworkSize:
-    """The size of networks, from the shapes of weights; ``scatter`` may be whole, as older files have it."""
-    place, wide = held[f"{_WEIGHTS}first"].shape[1:]
-    if f"{_WEIGHTS}scatter" in held:
-        direction = (held[f"{_WEIGHTS}scatter"].shape[1] - wide - EXTRAS[kind]) // 2
-    else:
-        direction = held[f"{_WEIGHTS}scatter.light"].shape[1]
-    return NetworkSize(wide, (place - 3) // 6, (direction - 3) // 6, kind)
 
 
 @dataclass

@@ -206,7 +206,12 @@ class LampGrid:
             along: cells along the longer side; None for a few faces in each.
             from_outside: whether the mesh is closed and only places outside of it will be asked for.
         """
-        turn, count = _across(lamp), len(mesh.faces)
+        # A rotation whose last column is towards the lamp.
+        aside, count = np.zeros(3), len(mesh.faces)
+        aside[np.argmin(np.abs(lamp))] = 1.0
+        one = np.cross(lamp, aside)
+        one /= np.linalg.norm(one)
+        turn = np.ascontiguousarray(np.column_stack([one, np.cross(lamp, one), lamp]))
         turned = mesh.vertices @ turn
         least, most = _reach(turned)
         side = max(1, int(_ALONG * np.sqrt(count))) if along is None else along
@@ -250,15 +255,6 @@ class LampGrid:
         seen = np.empty(len(places), np.bool_)
         _sees(places, least, own, faced, self.from_outside, self.lists, seen)
         return seen
-
-
-def _across(lamp: FloatArray) -> FloatArray:
-    """``(3, 3)`` rotation whose last column is a unit vector."""
-    aside = np.zeros(3)
-    aside[np.argmin(np.abs(lamp))] = 1.0
-    one = np.cross(lamp, aside)
-    one /= np.linalg.norm(one)
-    return np.ascontiguousarray(np.column_stack([one, np.cross(lamp, one), lamp]))
 
 
 @compiled

@@ -13,9 +13,9 @@ from harness.basics.errors import DataRefused
 from harness.basics.files.lock_file import hold_folder
 from harness.basics.mesh import Mesh
 from harness.objectfile.audio.audio import open_audio
-from harness.objectfile.audio.table import table_bytes
 from harness.objectfile.entries import Domain, Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
 from harness.objectfile.file import ObjectFile, file_entry
+from harness.objectfile.npy_file import npy_bytes
 from harness.objectfile.self_test import open_network
 from harness.objectfile.surface_file import ply_bytes
 from harness.objectfile.verify.network import look_at_domain, look_at_self_test
@@ -118,7 +118,7 @@ def test_weights_outside_of_the_folder_are_not_fetched(spoiled: Path) -> None:
 
 def test_a_table_of_another_object_is_told_from_the_network(spoiled: Path) -> None:
     random = np.random.default_rng(0).uniform(-1.0, 1.0, (642, MODES, 3)).astype(np.float16)
-    found = failures(exchange(spoiled, "audio_table.npy", table_bytes(random)))
+    found = failures(exchange(spoiled, "audio_table.npy", npy_bytes(random, "<f2")))
     assert "table" in " ".join(found["audio: network and table"].split())
 
 

@@ -17,8 +17,9 @@ from harness.basics.faces.nearest_kernels import shares_on_faces
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.objectfile.audio.audio import CHUNK, ObjectAudio, open_audio
-from harness.objectfile.audio.table import scaled, table_bytes, table_from
+from harness.objectfile.audio.table import scaled, table_from
 from harness.objectfile.file import ObjectFile
+from harness.objectfile.npy_file import npy_bytes
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.sim.modal.modes import dampings, nearest_shares
 from harness.sim.sound.modal_radiation import radiation
@@ -187,12 +188,12 @@ GOOD = np.ones((4, 2, 3), np.float16)
         (pickled(), "holds object"),
         (zipped(), ".npy"),
         (b"", ".npy"),
-        (table_bytes(GOOD)[:-1], "bytes"),
-        (table_bytes(GOOD) + b"x", "bytes"),
-        (table_bytes(GOOD).replace(b"(4, 2, 3)", b"(9, 9, 9)"), "float16"),
-        (table_bytes(GOOD).replace(b"'<f2'", b"'>f2'"), "float16"),
-        (table_bytes(GOOD).replace(b"False", b"True "), "float16"),
-        (table_bytes(np.full((4, 2, 3), np.nan, np.float16)), "24 numbers .*finite"),
+        (npy_bytes(GOOD, "<f2")[:-1], "bytes"),
+        (npy_bytes(GOOD, "<f2") + b"x", "bytes"),
+        (npy_bytes(GOOD, "<f2").replace(b"(4, 2, 3)", b"(9, 9, 9)"), "float16"),
+        (npy_bytes(GOOD, "<f2").replace(b"'<f2'", b"'>f2'"), "float16"),
+        (npy_bytes(GOOD, "<f2").replace(b"False", b"True "), "float16"),
+        (npy_bytes(np.full((4, 2, 3), np.nan, np.float16), "<f2"), "24 numbers .*finite"),
     ],
     ids=["pickle", "zip", "empty", "short", "long", "shape", "endian", "order", "nan"],
 )
