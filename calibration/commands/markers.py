@@ -54,6 +54,8 @@ def markers(
 
     Try: touchstone calibrate markers rest.png --spacing 1.5mm --report page/
     """
+    import numpy as np
+
     from calibration.markers.at_rest import Printed, markers_at_rest
     from calibration.markers.result import answer_of, file_of
     from calibration.taxim.pictures import set_digest
@@ -72,9 +74,8 @@ def markers(
     )
     with refusals_name(source):
         made = markers_at_rest(pictures, printed)
-    file = file_of(
-        made, printed, f"sha256 {set_digest(pictures[0], _rest(pictures))}, {len(pictures)} pictures"
-    )
+    rest = np.stack(pictures[1:]) if len(pictures) > 1 else np.zeros((0, 0, 0, 3), np.uint8)
+    file = file_of(made, printed, f"sha256 {set_digest(pictures[0], rest)}, {len(pictures)} pictures")
     artefact = out if out is not None else Path(f"{source.resolve().stem}_markers.json")
     write_model(file, artefact)
     answer = {**answer_of(made, file), "artefact": str(artefact), "report": None}
@@ -103,12 +104,6 @@ def _pictures(source: Path) -> "list[ByteArray]":
             f"{source} holds no pictures ({', '.join(SUFFIXES)}); put some of the resting gel there"
         )
     return [read_image(file) for file in files]
-
-
-def _rest(pictures: "list[ByteArray]") -> "ByteArray":
-    import numpy as np
-
-    return np.stack(pictures[1:]) if len(pictures) > 1 else np.zeros((0, 0, 0, 3), np.uint8)
 
 
 def _say(answer: dict[str, Any]) -> None:

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
-from calibration.commands.taxim_answer import answer_of, doubts, keep, say, scale_answer, write_published
+from calibration.commands.taxim_answer import answer_of, doubts, say, scale_answer, write_published
 from harness.basics.errors import WrongUse
 from harness.commands import options
 from harness.commands.output import CONSOLE, emit, resumable, step_progress, stopped, warn
@@ -188,6 +189,7 @@ def taxim(
     from calibration.taxim.mark_free import calibrate
     from calibration.taxim.pictures import squared
     from harness.basics.quantities import LENGTH
+    from harness.basics.whole_file import write_text_whole
     from harness.sim.optics.lit_calibration import read_calibration
     from harness.sim.optics.tactile_calibration import save_calibration
 
@@ -216,7 +218,10 @@ def taxim(
     who = _identity(sensor, serial, licence, pitch, wanted.ball_radius, arm, scale, pictures)
     known = None if like is None else read_calibration(like)
     made = calibrate(pictures, who, use_marks=marks, like=known)
-    artefact = out if out is not None else _place(source, arm is not None)
+    artefact = out
+    if artefact is None:
+        by_pictures = Path(f"{source.resolve().stem}_calibration.npz")
+        artefact = by_pictures if arm is None else source / "fitted.npz"
     save_calibration(made.calibration, artefact)
     write_published(made, polycalib, shadow_table)
     page = None
@@ -233,7 +238,10 @@ def taxim(
         "made_square_by": pictures.aspect,
     }
     if scale is not None and arm is not None:
-        keep({**answer["scale"], "made_square_by": pictures.aspect}, artefact)
+        # The artefact's format has a place for the pitch alone.
+        measured = {"schema": 1, **answer["scale"], "made_square_by": pictures.aspect}
+        text = dumps(measured, indent=1, allow_nan=False) + "\n"
+        write_text_whole(artefact.with_name(f"{artefact.stem}.scale.json"), text)
         for doubt in doubts(scale, arm, pictures.aspect):
             warn(doubt)
     if json:
@@ -259,10 +267,6 @@ def _read(
     return arm, arm.scale(), arm.pictures
 
 
-def _place(source: Path, by_arm: bool) -> Path:
-    return source / "fitted.npz" if by_arm else Path(f"{source.resolve().stem}_calibration.npz")
-
-
 def _identity(
     sensor: str | None,
     serial: str,
@@ -277,6 +281,7 @@ def _identity(
     from calibration.taxim.mark_free import Identity
     from harness.basics.errors import WrongUse
     from harness.basics.quantities import LENGTH
+    from harness.bench.sensor import described_sensor, shipped_sensors
 
     recorded = None if arm is None else arm.ball_radius
     if ball_radius is None and recorded is None:
@@ -287,7 +292,12 @@ def _identity(
             "mm; leave it out"
         )
     stated = options.positive("--pitch", pitch, LENGTH)
-    described = _described(sensor)
+    described = None
+    # Any other name is the sensor's own, without a description.
+    if sensor is not None and (
+        sensor in shipped_sensors() or Path(sensor).suffix == ".toml" or Path(sensor).is_file()
+    ):
+        described = described_sensor(sensor).sensor
     if stated is not None:
         known = stated
     elif scale is not None:
@@ -303,16 +313,6 @@ def _identity(
         pitch=known,
         ball_radius=recorded if recorded is not None else ball_radius or 0.0,
     )
-
-
-def _described(sensor: str | None) -> "TactileSensor | None":
-    """Return the sensor of a shipped name or of a sensor file; None for any other name."""
-    from harness.bench.sensor import described_sensor, shipped_sensors
-
-    is_known = sensor is not None and (
-        sensor in shipped_sensors() or Path(sensor).suffix == ".toml" or Path(sensor).is_file()
-    )
-    return described_sensor(sensor).sensor if sensor is not None and is_known else None
 
 
 def _pitch_of_pictures(sensor: "TactileSensor | None", pictures: "Pictures") -> float:

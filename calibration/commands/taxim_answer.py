@@ -1,6 +1,5 @@
 """What ``touchstone calibrate taxim`` answers: numbers for programs, lines for people, and what to doubt."""
 
-from json import dumps
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -158,14 +157,6 @@ def doubts(scale: "ArmScale", arm: "ArmPresses", squared: float) -> list[str]:
             "background: an imprint that had not gone, dirt, or a gel that moved"
         )
     return said
-
-
-def keep(scale: dict[str, Any], artefact: Path) -> None:
-    """What the arm measured, beside the artefact, whose format has a place for the pitch alone."""
-    from harness.basics.whole_file import write_text_whole
-
-    path = artefact.with_name(f"{artefact.stem}.scale.json")
-    write_text_whole(path, dumps({"schema": 1, **scale}, indent=1, allow_nan=False) + "\n")
 
 
 def write_published(made: "MarkFree", polycalib: Path | None, shadow_table: Path | None) -> None:

@@ -54,6 +54,11 @@ def answer_of(made: RestingMarkers, file: MarkerFile) -> dict[str, Any]:
     """The numbers, for programs."""
     lattice, on = made.lattice, made.lattice.on
     scale = made.scale
+    # A straight grid of the same spacing, centred in the picture.
+    rows, columns = made.picture.shape[:2]
+    middle = 0.5 * np.array([columns - 1.0, rows - 1.0])
+    size = np.array([lattice.columns, lattice.rows])
+    centred = middle + (lattice.index[on] - (size - 1) / 2.0) * lattice.spacing
     return {
         "schema": 1,
         "dots": int(on.sum()),
@@ -73,7 +78,7 @@ def answer_of(made: RestingMarkers, file: MarkerFile) -> dict[str, Any]:
         "ink": file.ink,
         "bend_px": _rms(lattice.affine[on]),
         "misprint_px": _rms(lattice.local[on]),
-        "from_a_centred_grid_px": _from_centred(made),
+        "from_a_centred_grid_px": float(np.hypot(*(made.dots.places[on] - centred).T).max()),
         "pitch_m": made.pitch,
         "spacing_m": None if made.pitch is None else made.pitch * file.spacing_px,
         "scale": None
@@ -163,15 +168,6 @@ def _notes(answer: dict[str, Any]) -> list[str]:
             "spacing is off by: one that is wrong by a hundredth is a pitch that is wrong by a hundredth."
         )
     return notes
-
-
-def _from_centred(made: RestingMarkers) -> float:
-    """Pixels, the most by which a dot is off a centred, straight grid of the same spacing."""
-    on, size = made.lattice.on, np.array([made.lattice.columns, made.lattice.rows])
-    rows, columns = made.picture.shape[:2]
-    middle = 0.5 * np.array([columns - 1.0, rows - 1.0])
-    centred = middle + (made.lattice.index[on] - (size - 1) / 2.0) * made.lattice.spacing
-    return float(np.hypot(*(made.dots.places[on] - centred).T).max())
 
 
 def _rms(off: FloatArray) -> float:

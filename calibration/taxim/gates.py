@@ -246,6 +246,11 @@ def _sighting(image: ByteArray, background: ByteArray, detector: Detector, ball:
     rest = far if far.any() else np.ones((rows, columns), np.bool_)
     straight = float(np.abs(change[rest]).mean())
     crossed = float(np.abs(image[rest][:, ::-1].astype(np.float64) - background[rest]).mean())
+    lost = None
+    try:
+        require_whole(image, background)
+    except PictureRefused as refusal:
+        lost = str(refusal)
     return Sighting(
         found,
         drift,
@@ -254,16 +259,8 @@ def _sighting(image: ByteArray, background: ByteArray, detector: Detector, ball:
         float(loud.sum() / (np.pi * (CONTACT * ball) ** 2)),
         straight > _SWAP_LEAST and crossed < _SWAP * straight,
         block_means(change - drift, max(1, round(ball / 8.0))),
-        _lost(image, background),
+        lost,
     )
-
-
-def _lost(image: ByteArray, background: ByteArray) -> str | None:
-    try:
-        require_whole(image, background)
-    except PictureRefused as refusal:
-        return str(refusal)
-    return None
 
 
 def _verdict(name: str, one: Sighting) -> Refused | None:

@@ -156,7 +156,11 @@ def _calibrated(
         fine = np.array([k not in worse for k in range(len(kept))])
         refused = [*refused, *worse.values()]
         pack, change, kept = pack.of(np.nonzero(fine)[0]), change[fine], kept[fine]
-        _still_enough(pack, refused)
+        if len(pack.images) < max(LEAST_PRESSES, len(refused)):
+            raise CalibrationRefused(
+                f"{len(refused)} presses are refused and {len(pack.images)} left; at least {LEAST_PRESSES}, "
+                f"and half of the set, are wanted; {refused[-1].name}: {refused[-1].reason}"
+            )
         model = teach(pack, change, ball)
     radius = WITHIN * model.fit.edge
     out = held_out(pack, change, ball, radius)
@@ -224,14 +228,6 @@ def _usable(pictures: Pictures, ball: float, use_marks: bool) -> tuple[PressPack
         pictures.sha256,
     )
     return pack, kept, [verdict for verdict in verdicts if verdict is not None]
-
-
-def _still_enough(pack: PressPack, refused: list[Refused]) -> None:
-    if len(pack.images) < max(LEAST_PRESSES, len(refused)):
-        raise CalibrationRefused(
-            f"{len(refused)} presses are refused and {len(pack.images)} left; at least {LEAST_PRESSES}, and "
-            f"half of the set, are wanted; {refused[-1].name}: {refused[-1].reason}"
-        )
 
 
 def _used(name: str, clean: FloatArray, centre: FloatArray, identity: Identity, score: Score) -> UsedPress:

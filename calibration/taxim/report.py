@@ -13,7 +13,7 @@ from calibration.taxim.mark_free import MarkFree, UsedPress
 from calibration.taxim.pictures import Pictures
 from calibration.taxim.shadow import SAMPLE_STEP
 from calibration.taxim.smooth_fit import distance
-from harness.basics.arrays import ByteArray, FloatArray
+from harness.basics.arrays import ByteArray
 from harness.report.figures.calibration import (
     LONGER,
     bins_figure,
@@ -28,7 +28,6 @@ from harness.report.template import write_page
 from harness.sim.gel.gel import deform
 from harness.sim.optics.lit_calibration import LitCalibration
 from harness.sim.optics.optics import Optics
-from harness.sim.optics.tactile_calibration import TactileCalibration
 
 PAGE = "calibration.html"
 """Name of the page in its folder."""
@@ -84,6 +83,10 @@ def write_report(
     scores = {
         name: np.array([vars(press.score)[name] for press in made.used]) for name in vars(made.used[0].score)
     }
+    shadow = made.shadow
+    dark_sides = np.array([one.dark_side for one in shadow.colours])
+    step = header.pitch * SAMPLE_STEP
+    shadows = shadow_figure(shadow.directions, step, shadow.typical, shadow.cells, dark_sides)
     return write_page(
         folder / PAGE,
         PAGE,
@@ -95,7 +98,7 @@ def write_report(
         moved=None if scale is None or arm is None else _moves(scale, arm, album),
         numbers=[] if scale is None else _numbers(scale),
         longer=f"{LONGER:g}",
-        shadowed=_shadow_picture(made, album),
+        shadowed=album.drawing("shadow", shadows),
         shadows=_shadow_lines(made),
         **_believed(made.calibration, album),
     )
@@ -182,14 +185,6 @@ def _shadow_note(made: MarkFree) -> str:
     )
 
 
-def _shadow_picture(made: MarkFree, album: Album) -> Picture:
-    shadow = made.shadow
-    dark_sides = np.array([one.dark_side for one in shadow.colours])
-    step = made.calibration.header.pitch * SAMPLE_STEP
-    figure = shadow_figure(shadow.directions, step, shadow.typical, shadow.cells, dark_sides)
-    return album.drawing("shadow", figure)
-
-
 def _shadow_lines(made: MarkFree) -> list[tuple[str, ...]]:
     """Of the table under the figure, one a colour."""
     return [
@@ -241,23 +236,15 @@ def _about(press: UsedPress, made: MarkFree, pictures: Pictures) -> tuple[ByteAr
     change = live.astype(np.float64) - pictures.background
     far = distance((live.shape[0], live.shape[1]), centre) > AWAY * made.contact_radius
     drift = np.median(change[far], axis=0)
-    drawn = draw_press(made.calibration, centre, made.contact_radius)
+    header = made.calibration.header
+    ball = header.ball_radius / header.pitch
+    away = distance((made.calibration.rows, made.calibration.columns), centre)
+    depth = depth_of(header.skirt, made.contact_radius, ball)
+    surface = deform((header.pitch * pressed_ball(away, depth, ball))[None], header.skirt)
+    drawn: ByteArray = Optics(made.calibration, "smooth").render(surface).images[0]
     reach = _MARGIN * made.contact_radius
     rows, columns = live.shape[:2]
     x0, y0 = np.maximum(np.floor(centre - reach).astype(int), 0)
     x1, y1 = np.minimum(np.ceil(centre + reach).astype(int), (columns, rows))
     shifted = np.clip(np.round(live - drift), 0.0, 255.0).astype(np.uint8)
     return shifted[y0:y1, x0:x1], drawn[y0:y1, x0:x1]
-
-
-def draw_press(calibration: TactileCalibration, centre: FloatArray, radius: float) -> ByteArray:
-    """``(rows, columns, 3)`` RGB of a ball in the gel at a centre (column, row), drawn as anything is drawn.
-
-    The smooth level, with the gel's skirt; ``radius`` in pixels is the contact line's.
-    """
-    header = calibration.header
-    ball = header.ball_radius / header.pitch
-    away = distance((calibration.rows, calibration.columns), centre)
-    reached = header.pitch * pressed_ball(away, depth_of(header.skirt, radius, ball), ball)
-    drawn: ByteArray = Optics(calibration, "smooth").render(deform(reached[None], header.skirt)).images[0]
-    return drawn

@@ -130,7 +130,12 @@ def fit_shadow(pack: PressPack, clean: FloatArray, centres: FloatArray, light: G
     enough = known >= _LEAST_PRESSES
     found = [_colour(seen, c, enough, known) for c in range(3)]
     depth = float(np.interp(seen.starts, np.arange(len(light.profile.height)), light.profile.height).mean())
-    lists = [_lists(seen.seen[..., c], cells, enough) for c, (_, cells) in enumerate(found)]
+    # Of every colour and direction the grey levels that its shadow holds it down to, outwards from the rim.
+    lists: list[list[FloatArray]] = []
+    for c, (_, cells) in enumerate(found):
+        level = np.where(cells, _typical(seen.seen[..., c], enough), _NONE)
+        ends = [1 + int(np.flatnonzero(one)[-1]) if one.any() else 0 for one in cells]
+        lists.append([level[d, :end] for d, end in enumerate(ends)])
     drawn = any(len(one) for colour in lists for one in colour)
     table = _table(seen.directions, lists, depth) if drawn else None
     typical = read_only(np.stack([_typical(seen.left[..., c], enough) for c in range(3)]))
@@ -232,13 +237,6 @@ def _direction(seen: Around, left: FloatArray, cells: BoolArray) -> tuple[float,
     across = (each * np.conj(mean)).imag / np.abs(mean) ** 2
     error = float(across.std(ddof=1) / np.sqrt(len(each)))
     return float(np.angle(mean) % (2.0 * np.pi)), error
-
-
-def _lists(seen: FloatArray, cells: BoolArray, enough: BoolArray) -> list[FloatArray]:
-    """Of every direction the grey levels that its shadow holds colours down to, outwards from the rim."""
-    level = np.where(cells, _typical(seen, enough), _NONE)
-    ends = [1 + int(np.flatnonzero(one)[-1]) if one.any() else 0 for one in cells]
-    return [level[d, :end] for d, end in enumerate(ends)]
 
 
 def _table(directions: FloatArray, lists: list[list[FloatArray]], depth: float) -> ShadowTable:

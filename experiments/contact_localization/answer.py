@@ -194,21 +194,18 @@ def located(
         if usual.levels == accuracy.levels:
             raise
         lost = time.perf_counter() - began
-        return _looked_again(located(readings, usual, first, judged), lost)
+        found = located(readings, usual, first, judged)
+        last = found[-1]
+        # What the refused attempt took counts with the last one's judging.
+        seconds = {**last.seconds, "judge": last.seconds.get("judge", 0.0) + lost}
+        doubt = "at the levels asked for no place explained the readings; at the default levels this one does"
+        return (*found[:-1], replace(last, seconds=seconds, doubts=(*last.doubts, doubt)))
     factor = found[-1].times_stated if judged and accuracy.of(METHOD) == "grid" else 1.0
     if factor == 1.0:
         return found
     less_sure = replace(readings, prior=readings.prior.times(factor))
     wider = _located_at(errors.times(factor), less_sure, accuracy)[-1]
     return (*found[:-1], _widened(found[-1], wider, factor))
-
-
-def _looked_again(found: tuple[Estimate, ...], lost: float) -> tuple[Estimate, ...]:
-    """Estimates at the default levels, the s that the others took counted with the last one's judging."""
-    last = found[-1]
-    seconds = {**last.seconds, "judge": last.seconds.get("judge", 0.0) + lost}
-    doubt = "at the levels asked for no place explained the readings; at the default levels this one does"
-    return (*found[:-1], replace(last, seconds=seconds, doubts=(*last.doubts, doubt)))
 
 
 def _located_at(

@@ -94,7 +94,12 @@ def arm_scale(
     every = np.array([_numbers(one.gel_from_pixels) for one in maps])
     middle = np.mean([one.gel_from_pixels for one in maps], axis=0)
     values = _numbers(middle)
-    by_scatter = np.sqrt(np.mean([_variances(one) for one in maps], axis=0))
+    # Variances of the numbers by the scatter: first order, both axes of the arm alike.
+    variances = []
+    for one in maps:
+        slopes = _slopes(_numbers, one.gel_from_pixels)
+        variances.append([sum(axis @ one.covariance @ axis for axis in slope) for slope in slopes])
+    by_scatter = np.sqrt(np.mean(variances, axis=0))
     # All ways look at the same pictures: their standard deviation would make too little of what they share.
     by_seeing = np.abs(every - values).max(axis=0)
     if uncorrected is not None:
@@ -107,7 +112,12 @@ def arm_scale(
         Uncertain(float(v), float(np.hypot(a, b)), float(a), factor * float(np.hypot(a, b)))
         for v, a, b in zip(values, by_scatter, by_seeing, strict=True)
     )
-    _require_square(skew)
+    if abs(skew.value) > max(LARGEST_SKEW, skew.within95):
+        raise CalibrationRefused(
+            f"rows and columns stand {np.degrees(skew.value):+.2f} deg (to {np.degrees(skew.within95):.2f}) "
+            f"from square, and a camera's at most {np.degrees(LARGEST_SKEW):g}: the gel slips sideways as it "
+            "is pressed, the arm's frames are wrong, or the picture is warped; look at the map of the presses"
+        )
     return ArmScale(
         wide,
         high,
@@ -184,15 +194,6 @@ def _require_spread(seen: FloatArray, found: _Map) -> None:
         )
 
 
-def _require_square(skew: Uncertain) -> None:
-    if abs(skew.value) > max(LARGEST_SKEW, skew.within95):
-        raise CalibrationRefused(
-            f"rows and columns stand {np.degrees(skew.value):+.2f} deg (to {np.degrees(skew.within95):.2f}) "
-            f"from square, and a camera's at most {np.degrees(LARGEST_SKEW):g}: the gel slips sideways as it "
-            "is pressed, the arm's frames are wrong, or the picture is warped; look at the map of the presses"
-        )
-
-
 def _numbers(gel_from_pixels: FloatArray) -> FloatArray:
     """Pitch, aspect, rotation, skew, and the steps of columns and of rows, of a map: ``(6,)``."""
     column, row = gel_from_pixels.T
@@ -201,12 +202,6 @@ def _numbers(gel_from_pixels: FloatArray) -> FloatArray:
     apart = np.mod(down - across + np.pi, 2.0 * np.pi) - np.pi
     middle = np.mod(across + 0.5 * apart + np.pi, 2.0 * np.pi) - np.pi
     return np.array([np.sqrt(wide * high), high / wide, middle, apart, wide, high])
-
-
-def _variances(one: _Map) -> FloatArray:
-    """Of the six numbers, by the scatter: first order, both axes of the arm alike."""
-    slopes = _slopes(_numbers, one.gel_from_pixels)
-    return np.array([sum(axis @ one.covariance @ axis for axis in slope) for slope in slopes])
 
 
 def _slopes(of: Callable[[FloatArray], FloatArray], at: FloatArray) -> FloatArray:

@@ -170,8 +170,12 @@ def plan_presses(
             "tried: put it elsewhere and say so in the scene's [object.pose]"
         )
     segments: list[Segment] = [part for k, one in enumerate(contacts) for part in one.segments(k)]
-    motions = tuple(_motion(one, bench, place, deepest) for one, place in zip(contacts, on_gel, strict=True))
-    return PressPlan(motions, rehearse(bench, segments).require(), settings, top)
+    motions = []
+    for one, place in zip(contacts, on_gel, strict=True):
+        pose = one.base_from_stand_off
+        axis = (pose @ bench.flange_from_gel)[:3, 2]
+        motions.append(PressMotion(one.start, one.travel, pose, axis, STAND_OFF - deepest, STAND_OFF, place))
+    return PressPlan(tuple(motions), rehearse(bench, segments).require(), settings, top)
 
 
 def _contacts(
@@ -188,10 +192,3 @@ def _contacts(
         planned.append(contact)
         joints = contact.stand_off_joints
     return planned
-
-
-def _motion(contact: PlannedContact, bench: TwinBench, on_gel: FloatArray, deepest: float) -> PressMotion:
-    axis = (contact.base_from_stand_off @ bench.flange_from_gel)[:3, 2]
-    pose = contact.base_from_stand_off
-    touch = STAND_OFF - deepest
-    return PressMotion(contact.start, contact.travel, pose, axis, touch, STAND_OFF, on_gel)

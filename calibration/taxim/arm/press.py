@@ -173,7 +173,8 @@ class BallPresses:
             # The frame before the last may have been exposed while the arm still moved.
             frames = bench.gel.read(2, wanted.still.timeout)
             frame = Reading(frames.channel, frames.times[-1:], frames.values[-1:], frames.encoded[-1:])
-            if seen or touch_seen(look(frame) - rest) >= wanted.notice:
+            blurred = gaussian_filter(look(frame) - rest, (_BLUR, _BLUR, 0.0))
+            if seen or np.abs(blurred).max() >= wanted.notice:
                 seen.append(frame)
                 way.append(down)
                 last = min(way[0] + wanted.depth, motion.lowest - wanted.step)
@@ -205,12 +206,6 @@ def _numbers(settling: Settling, touched: bool) -> tuple[Reading, Reading]:
         Reading(Channel(STATE, "1, 1, s", (3,), "float64"), end, state),
         Reading(Channel(UNREST, "count", (), "float64"), times, unrest),
     )
-
-
-def touch_seen(change: FloatArray) -> float:
-    """Grey levels of the strongest change of one picture against the untouched gel, noise blurred away."""
-    blurred = gaussian_filter(change, (_BLUR, _BLUR, 0.0))
-    return float(np.abs(blurred).max())
 
 
 class PressWatch:

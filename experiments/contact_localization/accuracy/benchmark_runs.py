@@ -200,11 +200,9 @@ _Recorded = tuple[tuple[Observation, ...], FloatArray]
 
 def _recorded(cell: Cell, scene: SceneFile, station: Station) -> _Recorded:
     scene = scene_of(cell, scene)
-    return _planned(cell, scene, station) if cell.choose == "planned" else _chosen(cell, scene, station)
-
-
-def _chosen(cell: Cell, scene: SceneFile, station: Station) -> _Recorded:
-    """Contacts chosen one by one are chosen on what is recorded of those before."""
+    if cell.choose == "planned":
+        return _planned(cell, scene, station)
+    # Contacts chosen one by one are chosen on what is recorded of those before.
     with TemporaryDirectory(prefix="touchstone-table-") as folder:
         recording = in_process.performed(named(PROGRAM), cell, scene, station, Path(folder) / "run")
         contacts = json.loads(recording.truth_path.read_text(encoding="utf-8"))["contacts"]

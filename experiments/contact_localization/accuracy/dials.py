@@ -99,7 +99,11 @@ def settings(
     if sound:
         found += [grid("both", *dials) for dials in _GRIDS]
         found += [by_sound(float(spacing)) for spacing in SPACING.levels]
-        found += _other_modes()
+        # Fewer modes, and modes of coarser elements, than the default ones.
+        few: tuple[dict[str, Level], ...] = ({MODES.name: 16}, {MODES.name: 32}, {EDGE.name: 0.7})
+        full, quick = grid("both", *_DEFAULT), grid("both", *_COARSEST)
+        found += [{**full, **level} for level in few]
+        found += [{**quick, **few[0]}, {**by_sound(2e-3), **few[1]}]
     for turned in _turned(sound) if thorough else ():
         if turned not in found:
             found.append(turned)
@@ -116,13 +120,6 @@ def settings_by_count(sound: bool = True) -> list[dict[str, Level]]:
     touch = [cheapest, *(grid("touch", *each) for each in dials)]
     both = [grid("both", *each) for each in dials]
     return [*touch, *both, by_sound(4e-3), by_sound(2e-3)] if sound else touch
-
-
-def _other_modes() -> list[dict[str, Level]]:
-    """Fewer modes, and modes of coarser elements, than the default ones."""
-    few: tuple[dict[str, Level], ...] = ({MODES.name: 16}, {MODES.name: 32}, {EDGE.name: 0.7})
-    full, quick = grid("both", *_DEFAULT), grid("both", *_COARSEST)
-    return [*({**full, **level} for level in few), {**quick, **few[0]}, {**by_sound(2e-3), **few[1]}]
 
 
 def _by_networks(dials: Sequence[Knob[Level]]) -> list[dict[str, Level]]:

@@ -242,7 +242,13 @@ def _answer(
     mesh = search.model.mesh
     hypotheses, clouds, owners = _everywhere(search, count, found)
     weights, yaws = hypotheses.weights, hypotheses.yaws
-    answers, chosen = _together(clouds, hypotheses)
+    # The last contact is the answer; the others are those of the most probable hypothesis that agrees with
+    # it, so that a symmetric object's contacts are not each answered under a yaw of its own.
+    answer = best_point(clouds[-1], weights)
+    near = np.linalg.norm(clouds[-1] - answer, axis=1) < AGREES
+    chosen = int(np.argmax(np.where(near, hypotheses.log_weights, -np.inf)))
+    others = [settled(cloud, weights, cloud[chosen]) for cloud in clouds[:-1]]
+    answers = np.array([*others, answer])
     # A view's pixel is off the surface where that curves within it; the answer is not.
     answers[-1] = nearest_point(mesh, answers[-1])
     points = clouds[-1]
@@ -286,20 +292,6 @@ def _everywhere(
     yaws, logs = hypotheses.yaws[owners] - turns, np.log(np.maximum(weights, 1e-300))
     spread = Hypotheses(hypotheses.gels[owners], yaws, logs - logs.max())
     return spread, [search.turning.turned(cloud[owners], turns) for cloud in clouds], owners
-
-
-def _together(clouds: Sequence[FloatArray], hypotheses: Hypotheses) -> tuple[FloatArray, int]:
-    """``(contacts, 3)`` points that one hypothesis can have touched, and which hypothesis that is.
-
-    The last contact is the answer; the others are those of the most probable hypothesis that agrees
-    with it, so that a symmetric object's contacts are not each answered under a yaw of its own.
-    """
-    weights = hypotheses.weights
-    answer = best_point(clouds[-1], weights)
-    near = np.linalg.norm(clouds[-1] - answer, axis=1) < AGREES
-    chosen = int(np.argmax(np.where(near, hypotheses.log_weights, -np.inf)))
-    others = [settled(cloud, weights, cloud[chosen]) for cloud in clouds[:-1]]
-    return np.array([*others, answer]), chosen
 
 
 def solve_run(

@@ -152,7 +152,12 @@ def by_sound(peaks: Peaks, materials: Sequence[MaterialGuess], nominal: float, s
             "or say what it is made of"
         )
     likeliest = max(range(len(matches)), key=lambda k: matches[k].log_evidence)
-    _require_apart(peaks, materials[likeliest].model, nominal, exact.likeliest)
+    shared = modes_a_peak(peaks, materials[likeliest].model, float(np.log(exact.likeliest / nominal)))
+    if shared > SHARED:
+        raise FitRefused(
+            f"{shared:.1f} modes share a peak of this object (limit {SHARED:g}): it is too soft or too thin "
+            "for its modes to be told apart, and what was heard fits many sizes; look at it, or touch it"
+        )
     belief = _mixed(matches, [one.belief.widened(one.sigma) for one in matches])
     return Hearing(belief, matches, time.perf_counter() - began)
 
@@ -189,17 +194,3 @@ def _mixed(matches: Sequence[Match], beliefs: Sequence[Belief]) -> Belief:
     """Beliefs of the matches, each weighed by its material's evidence."""
     weighed = [one.log_evidence + belief.log_density for one, belief in zip(matches, beliefs, strict=True)]
     return Belief.of(beliefs[0].range, np.logaddexp.reduce(weighed, axis=0))
-
-
-def _require_apart(peaks: Peaks, model: RingingModel, nominal: float, size: float) -> None:
-    """Refuse peaks that are no modes' own.
-
-    Raises:
-        FitRefused: at that size too many modes share each.
-    """
-    shared = modes_a_peak(peaks, model, float(np.log(size / nominal)))
-    if shared > SHARED:
-        raise FitRefused(
-            f"{shared:.1f} modes share a peak of this object (limit {SHARED:g}): it is too soft or too thin "
-            "for its modes to be told apart, and what was heard fits many sizes; look at it, or touch it"
-        )

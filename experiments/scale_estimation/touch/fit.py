@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from experiments.scale_estimation.touch.patch import Patch
-from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.arrays import FloatArray
 from harness.bench.bench_errors import USUAL, BenchErrors
 from harness.experiment.repeated_readings import PlaceTolerance, group_by_place, weigh_repeated
 from harness.sim.solid.surface_samples import Surface
@@ -158,20 +158,6 @@ class FreeSpace:
         )
 
 
-def places_of(patches: Sequence[Patch], tolerance: PlaceTolerance) -> IntArray:
-    """Assign each contact to the place that it touched.
-
-    Args:
-        patches: contacts.
-        tolerance: largest differences between two contacts at one place.
-
-    Returns:
-        ``(n,)`` index of the place, from 0.
-    """
-    lines = np.array([patch.press_line for patch in patches]).reshape(-1, 2, 3)
-    return group_by_place(lines[:, 0], lines[:, 1], tolerance)
-
-
 def distinct_paths(paths: Sequence[FloatArray], tolerance: PlaceTolerance) -> list[FloatArray]:
     """Keep the longest of the paths of the gel that lead along one line to one place.
 
@@ -207,7 +193,8 @@ class TouchProblem:
         places = [patch.points[:points] - stand.place for patch in patches]
         self._points = np.array(places).reshape(len(patches), points, 3)
         self._normals = np.array([patch.normal for patch in patches]).reshape(-1, 3)
-        visited = places_of(patches, stand.errors.same_place)
+        lines = np.array([patch.press_line for patch in patches]).reshape(-1, 2, 3)
+        visited = group_by_place(lines[:, 0], lines[:, 1], stand.errors.same_place)
         self._shares = weigh_repeated(visited)
         self.places = len(np.unique(visited))
         """number of different places that were touched; the contacts of one place count once."""

@@ -144,7 +144,11 @@ def by_touch(
     followed = _FOLLOWED if refined > CHEAP else 1
     scan = [_profile(rough, passed, found, costs, minima[apart[:followed]], logs, followed)]
     for k in apart:
-        scan.append(_scanned(fine, minima[k], float(least[k] - misfits[k])))
+        # Sizes about the minimum, and the least cost there, with what comes beside it.
+        starts = np.tile(minima[k], (len(_FINE), 1))
+        starts[:, 0] += min(fine.sigma(minima[k]), 0.25) * _FINE
+        _, fine_costs = fine.refined(starts, 6, fixed_size=True)
+        scan.append(np.column_stack([starts[:, 0], fine_costs + float(least[k] - misfits[k])]))
     rows = np.vstack(scan)
     at, costs_at = rows[np.argsort(rows[:, 0])].T
     at, first = np.unique(at, return_index=True)
@@ -205,12 +209,3 @@ def _apart(minima: FloatArray, least: FloatArray) -> list[int]:
         if all(abs(minima[k, 0] - minima[j, 0]) > 5e-3 for j in kept):
             kept.append(int(k))
     return kept
-
-
-def _scanned(problem: TouchProblem, minimum: FloatArray, beside: float) -> FloatArray:
-    """``(n, 2)`` logarithms of sizes about a minimum, and the least cost there, with what comes beside it."""
-    sigma = min(problem.sigma(minimum), 0.25)
-    starts = np.tile(minimum, (len(_FINE), 1))
-    starts[:, 0] += sigma * _FINE
-    _, costs = problem.refined(starts, 6, fixed_size=True)
-    return np.column_stack([starts[:, 0], costs + beside])

@@ -72,15 +72,12 @@ def _train(options: argparse.Namespace) -> None:
 
         train = partial(train_network, sense, profile, options.seed, options.processes)
         write_network(sense, train, folder, options.profile)
-    if REAL_SHAPES in senses:
-        _widen(options, folder)
-
-
-def _widen(options: argparse.Namespace, folder: Path) -> None:
-    """Write how much wider answers about scanned things are, by the networks that came with the program."""
+    if REAL_SHAPES not in senses:
+        return
     if options.meshes is None:
         sys.stdout.write("real shapes: left out; add --meshes FOLDER of scanned things\n")
         return
+    # How much wider answers about scanned things are, by the networks that came with the program.
     widths = train_real_shapes(options.meshes, options.seed)
     (folder / "real_shapes.json").write_text(json.dumps(widths, indent=1) + "\n", encoding="utf-8")
     sys.stdout.write(f"real shapes: {json.dumps(widths)}\n")

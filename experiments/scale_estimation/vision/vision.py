@@ -73,8 +73,12 @@ def by_sight(view: View, outline: SeenOutline, nominal: float, sizes: SizeRange)
     _require_same(view, best)
     log_nominal = np.log(nominal)
     density = np.full(len(sizes.logs), -np.inf)
-    for fit in _apart(fits, best.cost):
-        density = np.logaddexp(density, _scanned(problem, fit, sizes.logs - log_nominal))
+    separate: list[OutlineFit] = []  # the minima worth a scan, of each place and turn one
+    for fit in sorted(fits, key=lambda fit: fit.cost):
+        new = all(abs(fit.unknowns[0] - one.unknowns[0]) > 2e-3 for one in separate)
+        if fit.cost < best.cost + _FAR and new and len(separate) < _MOST_MODES:
+            separate.append(fit)
+            density = np.logaddexp(density, _scanned(problem, fit, sizes.logs - log_nominal))
     return Sight(add_unevenness(Belief.of(sizes, density)), best, time.perf_counter() - began)
 
 
@@ -155,16 +159,6 @@ def _starts(view: View, outline: SeenOutline, yaws: int) -> FloatArray:
         seen = 0.5 * ((high - low)[:, 0] / widths[0] + (high - low)[:, 1] / widths[half // 2])
         starts[:, 0] -= np.log(np.maximum(seen, 1e-3))
     return starts
-
-
-def _apart(fits: list[OutlineFit], least: float) -> list[OutlineFit]:
-    """The minima worth a scan, of each place and turn one."""
-    found: list[OutlineFit] = []
-    for fit in sorted(fits, key=lambda one: one.cost):
-        new = all(abs(fit.unknowns[0] - one.unknowns[0]) > 2e-3 for one in found)
-        if fit.cost < least + _FAR and new and len(found) < _MOST_MODES:
-            found.append(fit)
-    return found
 
 
 def _scanned(problem: OutlineProblem, fit: OutlineFit, logs: FloatArray) -> FloatArray:

@@ -114,7 +114,17 @@ def contact_sample(shape: TouchableShape, size: float, random: np.random.Generat
     ways: list[GelWay] = []
     count = int(random.integers(FEWEST, MOST + 1))
     for _ in range(count):
-        line = _into_the_unknown(standing, random) if random.random() < blind else _aimed(standing, random)
+        if random.random() < blind:
+            # Into the unknown: where a way towards the middle would end, and its direction.
+            slant, bearing = random.choice(SLANTS), random.uniform(0.0, 2.0 * np.pi)
+            level = np.sin(slant) * np.array([np.cos(bearing), np.sin(bearing)])
+            down = -np.append(level, np.cos(slant))
+            height = size * shape.mesh.vertices[:, 2].max() * random.uniform(0.3, 1.0)
+            aside = PLACE * random.standard_normal(2)
+            end = max(6.0e-3 + 0.015 * np.sin(slant), random.uniform(0.0, 0.8) * height)
+            line = np.append(aside, end), down
+        else:
+            line = _aimed(standing, random)
         ways.append(_made(standing, *line, off, random))
     return ways
 
@@ -136,15 +146,6 @@ def imprint_sample(shape: TouchableShape, size: float, random: np.random.Generat
             places = places + 0.03e-3 * random.standard_normal((len(places), 1)) * direction
             found.append(places[random.choice(len(places), POINTS, replace=False)])
     return found
-
-
-def _into_the_unknown(standing: _Standing, random: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Where a way towards the middle would end, and its direction."""
-    slant, bearing = random.choice(SLANTS), random.uniform(0.0, 2.0 * np.pi)
-    down = -np.array([np.sin(slant) * np.cos(bearing), np.sin(slant) * np.sin(bearing), np.cos(slant)])
-    height = standing.size * standing.shape.mesh.vertices[:, 2].max() * random.uniform(0.3, 1.0)
-    aside = PLACE * random.standard_normal(2)
-    return np.array([*aside, max(6.0e-3 + 0.015 * np.sin(slant), random.uniform(0.0, 0.8) * height)]), down
 
 
 def _aimed(standing: _Standing, random: np.random.Generator) -> tuple[FloatArray, FloatArray]:

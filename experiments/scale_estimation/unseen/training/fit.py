@@ -30,7 +30,8 @@ def fitted(
     module: SizeModule = MODULES[sense]()
     names = list(samples.inputs)
     inputs = {name: torch.from_numpy(np.float32(samples.inputs[name])) for name in names}
-    targets = torch.from_numpy(np.float32(_blurred(samples.sizes)))
+    shares = np.exp(-0.5 * ((MIDDLES - np.log(samples.sizes)[:, None]) / BLUR) ** 2)
+    targets = torch.from_numpy(np.float32(shares / shares.sum(axis=1, keepdims=True)))
     adam = torch.optim.AdamW(module.parameters(), lr=RATE, weight_decay=DECAY)
     steps = epochs * -(-len(targets) // BATCH)
     falling = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps)
@@ -57,13 +58,6 @@ def turned(given: dict[str, Tensor], draw: torch.Generator) -> dict[str, Tensor]
         x, y = given["ways"][..., first], given["ways"][..., first + 1]
         ways[..., first], ways[..., first + 1] = c * x - s * y, s * x + c * y
     return {**given, "ways": ways}
-
-
-def _blurred(sizes: FloatArray) -> FloatArray:
-    """``(n, BINS)`` shares of each bin."""
-    apart = (MIDDLES - np.log(sizes)[:, None]) / BLUR
-    shares = np.exp(-0.5 * apart**2)
-    return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
 
 def outputs_of(modules: Sequence[SizeModule], samples: SizeSamples) -> tuple[FloatArray, FloatArray]:

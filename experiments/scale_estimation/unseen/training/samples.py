@@ -11,12 +11,13 @@ import numpy as np
 
 from experiments.scale_estimation.unseen import contact_set
 from experiments.scale_estimation.unseen.ringing_shape import MODES, RingingShape
+from experiments.scale_estimation.unseen.spectrogram import features
 from experiments.scale_estimation.unseen.training.contact_samples import (
     TouchableShape,
     contact_sample,
     imprint_sample,
 )
-from experiments.scale_estimation.unseen.training.strike_samples import strike_sample
+from experiments.scale_estimation.unseen.training.strike_samples import RATE, strike_responses
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.errors import MeshRefused
 from harness.basics.materials import MATERIALS
@@ -87,7 +88,8 @@ def strikes(seed: int, count: int, number: int) -> list[SampleRow]:
     for _ in range(count if shape is not None else 0):
         assert shape is not None
         size, material = draw_size(random), str(random.choice(list(MATERIALS)))
-        bands, extras = strike_sample(shape, size, material, random)
+        responses, band = strike_responses(shape, size, material, random)
+        bands, extras = features(responses, RATE, band, MATERIALS[material])
         rows.append(({"bands": bands, "extras": extras}, size))
     return rows
 

@@ -4,7 +4,6 @@ import numpy as np
 from scipy.signal import fftconvolve
 
 from experiments.scale_estimation.unseen.ringing_shape import PLACES, RingingShape
-from experiments.scale_estimation.unseen.spectrogram import features
 from harness.basics.arrays import FloatArray
 from harness.basics.materials import MATERIALS
 from harness.sim.sound.synthesis import synthesize
@@ -28,14 +27,6 @@ REVERBERANT = (-18.0, 0.0)
 
 ECHOES = (0.12, 0.4)
 """S, in which the room's sound falls by 60 dB."""
-
-
-def strike_sample(
-    shape: RingingShape, size: float, material: str, random: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
-    """The features of ``STRIKES`` strikes at random places of an object, as ``features`` gives them."""
-    responses, band = strike_responses(shape, size, material, random)
-    return features(responses, RATE, band, MATERIALS[material])
 
 
 def strike_responses(
