@@ -53,11 +53,14 @@ def pressed_place(mesh: "Mesh", contact: Coordinates | None, vertex: int | None)
     """
     import numpy as np
 
-    from harness.basics.errors import WrongUse
-    from harness.sim.gel.press_pose import contact_place, contact_vertex
+    from harness.basics.errors import OutOfDomain, WrongUse
+    from harness.sim.gel.press_pose import contact_place
 
     if contact is not None and vertex is None:
         return contact_place(mesh, np.array(point("--contact", contact)))
     if vertex is not None and contact is None:
-        return contact_vertex(mesh, vertex)
+        count = len(mesh.vertices)
+        if not 0 <= vertex < count:
+            raise OutOfDomain(f"there is no vertex {vertex}; the mesh has {count}, say 0 to {count - 1}")
+        return contact_place(mesh, mesh.vertices[vertex])
     raise WrongUse("say where it is pressed: either --contact X Y Z, or --vertex N")

@@ -201,9 +201,15 @@ def contact_force(
             thick; pressures that do not settle, which no press was found to do.
     """
     require_depths(depth, thickness)
-    found = [_one(np.asarray(each, dtype=np.float64), pitch, thickness, gel, level, cells) for each in depth]
-    shares = np.array([shares for _, shares in found]).reshape(-1, len(PARTS))
-    pressure = np.array([pressure for pressure, _ in found]).reshape(depth.shape)
+    pressure, shares = np.zeros(depth.shape), np.zeros((len(depth), len(PARTS)))
+    for k, each in enumerate(np.asarray(depth, dtype=np.float64)):
+        if not each.any():
+            continue
+        fine, coarse = (_pressed(each, pitch, thickness, gel, level, cells * by) for by in (1, 2))
+        whole = fine.sum()
+        squares = abs(coarse.sum() - whole) / whole
+        pressure[k] = fine
+        shares[k] = (gel.young_share, *_known(each, pitch, thickness, gel), squares, THEORY[level])
     return ContactForce.of(depth, pressure, shares, pitch, thickness)
 
 
@@ -224,23 +230,15 @@ def require_depths(depth: FloatArray, thickness: float) -> None:
         )
 
 
-def _one(
-    depth: FloatArray, pitch: float, thickness: float, gel: GelElastic, level: ForceLevel, cells: int
-) -> tuple[FloatArray, tuple[float, ...]]:
-    """Pressure of every pixel, and the shares of its uncertainty."""
-    if not depth.any():
-        return np.zeros(depth.shape), (0.0,) * len(PARTS)
-    fine, coarse = (_pressed(depth, pitch, thickness, gel, level, cells * by) for by in (1, 2))
-    whole = fine.sum()
-    squares = abs(coarse.sum() - whole) / whole
-    return fine, (gel.young_share, *_known(depth, pitch, thickness, gel), squares, THEORY[level])
-
-
 def _pressed(
     depth: FloatArray, pitch: float, thickness: float, gel: GelElastic, level: ForceLevel, cells: int
 ) -> FloatArray:
     """Pa of every pixel, by squares of ``cells`` pixels a side."""
-    merged, side = _merged(depth, cells), pitch * cells
+    merged, side = depth, pitch * cells
+    if cells > 1:
+        # Means over squares of pixels; outside of the picture nothing presses.
+        rows, columns = depth.shape
+        merged = block_means(np.pad(depth, ((0, -rows % cells), (0, -columns % cells))), cells)
     if level == "winkler":
         # Every contact on springs of its own.
         parts, pascals = _contacts(merged), np.zeros(merged.shape)
@@ -263,15 +261,6 @@ def _settled(found: Pressure) -> FloatArray:
             "--level touch.force=winkler"
         )
     return found.pascals
-
-
-def _merged(depth: FloatArray, cells: int) -> FloatArray:
-    """Means over squares of pixels; outside of the picture nothing presses."""
-    if cells == 1:
-        return depth
-    rows, columns = depth.shape
-    padded = np.pad(depth, ((0, -rows % cells), (0, -columns % cells)))
-    return block_means(padded, cells)
 
 
 def _contacts(depth: FloatArray) -> IntArray:

@@ -90,18 +90,6 @@ def _contact_place(mesh: Mesh, point: FloatArray, place: FloatArray, face: int) 
     return ContactPlace(read_only(place), read_only(normal), moved)
 
 
-def contact_vertex(mesh: Mesh, vertex: int) -> ContactPlace:
-    """A vertex of a mesh, counted from 0, as a place to press.
-
-    Raises:
-        OutOfDomain: there is no such vertex, or its faces have no area.
-    """
-    count = len(mesh.vertices)
-    if not 0 <= vertex < count:
-        raise OutOfDomain(f"there is no vertex {vertex}; the mesh has {count}, say 0 to {count - 1}")
-    return contact_place(mesh, mesh.vertices[vertex])
-
-
 def gel_from_object(
     place: ContactPlace,
     depth: float,

@@ -133,9 +133,15 @@ def read_appearance(
     )
     with refused_as(MeshRefused, damaged), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        if path.suffix.lower() not in DECLARING:
+        kind = path.suffix.lower()
+        if kind not in DECLARING:
             _metres(units, None)
-        read = _read(path)
+        if kind == ".obj":
+            read = read_obj_colours(path)
+        elif kind in DECLARING:
+            read = DECLARING[kind](path, True)
+        else:
+            read = _read_with_trimesh(path)
     metres = _metres(units, read.metres)
     axis, _ = choose_up_axis(up_axis, read.up_axis)
     vertices, faces = merge_parts(read.parts)
@@ -158,13 +164,6 @@ def _metres(units: str, declared: float | None) -> float:
     if units not in METRES:
         raise WrongUse(f"unknown unit {units!r} for a mesh; say one of {', '.join(METRES)}")
     return METRES[units]
-
-
-def _read(path: Path) -> MeshFile:
-    if path.suffix.lower() == ".obj":
-        return read_obj_colours(path)
-    reader = DECLARING.get(path.suffix.lower())
-    return _read_with_trimesh(path) if reader is None else reader(path, True)
 
 
 def _read_with_trimesh(path: Path) -> MeshFile:

@@ -151,18 +151,14 @@ def _level_error(read: Inversion, agrees: bool, thickness: float | None) -> Floa
     return np.asarray(_SURROUNDINGS * deepest * np.minimum(1.0, height / (TOUCHED * deepest)))
 
 
-def _describe(frames: ByteArray) -> str:
-    """Return the size of pictures in words; the array's type and shape where they are no colour pictures."""
-    if frames.ndim == 4 and frames.dtype == np.uint8 and frames.shape[3] == 3:
-        return f"{len(frames)} of {frames.shape[2]} x {frames.shape[1]} pixels"
-    return f"{frames.dtype} {frames.shape}"
-
-
 def _check(frames: ByteArray, background: ByteArray | None, calibration: TactileCalibration) -> None:
     wanted = calibration.background.shape
     if frames.ndim != 4 or len(frames) == 0 or frames.dtype != np.uint8 or frames.shape[1:] != wanted:
+        described = f"{frames.dtype} {frames.shape}"
+        if frames.ndim == 4 and frames.dtype == np.uint8 and frames.shape[3] == 3:
+            described = f"{len(frames)} of {frames.shape[2]} x {frames.shape[1]} pixels"
         raise DataRefused(
-            f"the frames are {_describe(frames)}; this calibration reads at least one of "
+            f"the frames are {described}; this calibration reads at least one of "
             f"{wanted[1]} x {wanted[0]} pixels in 8-bit colour: give the camera's own pictures, not cropped "
             "or scaled"
         )

@@ -128,7 +128,9 @@ def _errors(
         if still.any():
             coarse -= coarse[still].mean()
             anchored_heights(coarse, down, right, weight, still)
-        draws[k] = _widened(coarse, block, shape) * (block * pitch)
+        if block > 1:
+            coarse = zoom(coarse, block, order=1, mode="nearest", grid_mode=True)
+        draws[k] = coarse[: shape[0], : shape[1]] * (block * pitch)
     return HeightErrors(read_only(draws), _FLOOR * pitch)
 
 
@@ -210,10 +212,3 @@ def _blocks(picture: FloatArray, block: int) -> FloatArray:
         axis=(1, 3)
     )
     return means
-
-
-def _widened(coarse: FloatArray, block: int, shape: tuple[int, ...]) -> FloatArray:
-    if block == 1:
-        return coarse
-    wide = zoom(coarse, block, order=1, mode="nearest", grid_mode=True)
-    return np.asarray(wide[: shape[0], : shape[1]])

@@ -63,7 +63,13 @@ class LitCalibration(TactileCalibration):
     (``calibration.taxim.table``); ``(0, 0, 3)`` in files that do not say it."""
 
     def __post_init__(self) -> None:
-        _require_errors(self.uncertainty, self.bins)
+        errors, bins = self.uncertainty, self.bins
+        fits = errors.shape in ((bins, bins, 3), (0, 0, 3)) and errors.dtype == np.float32
+        if not fits or not np.isfinite(errors).all() or (errors < 0.0).any():
+            raise CalibrationRefused(
+                f"uncertainty is {errors.dtype} {errors.shape}, below zero or not finite; finite float32 "
+                f"{(bins, bins, 3)} of 0 or more are wanted: fit the calibration again"
+            )
         wanted = (smooth_terms() + len(LIGHT_POWERS) * POSITION_TERMS, 3)
         found = self.lit
         if found.shape != wanted or found.dtype != np.float64 or not np.isfinite(found).all():
@@ -129,15 +135,6 @@ class ShadowedCalibration(LitCalibration):
         """The shadows as simulators throw them; ``CalibrationRefused`` where they do not hold together."""
         lists = (self.shadow_directions, self.shadow_lengths, self.shadow_values)
         return ShadowTable(*lists, *(float(value) for value in self.shadow_rays[:5]))
-
-
-def _require_errors(found: Float32Array, bins: int) -> None:
-    fits = found.shape in ((bins, bins, 3), (0, 0, 3)) and found.dtype == np.float32
-    if not fits or not np.isfinite(found).all() or (found < 0.0).any():
-        raise CalibrationRefused(
-            f"uncertainty is {found.dtype} {found.shape}, below zero or not finite; finite float32 "
-            f"{(bins, bins, 3)} of 0 or more are wanted: fit the calibration again"
-        )
 
 
 def with_shadow(calibration: LitCalibration, table: ShadowTable, seen: float) -> ShadowedCalibration:

@@ -16,7 +16,7 @@ from harness.basics.arrays import ByteArray, FloatArray, read_only
 from harness.basics.errors import CalibrationRefused
 from harness.basics.npz_file import read_array, read_arrays
 from harness.bench.sensor import TactileSensor
-from harness.sim.gel.gel import R15_SKIRT, TAXIM_SKIRT, GelSkirt, skirt_for
+from harness.sim.gel.gel import R15_SKIRT, TAXIM_SKIRT, skirt_for
 from harness.sim.optics.shadow import ShadowTable
 from harness.sim.optics.shadow_file import read_shadow_table
 from harness.sim.optics.tactile_calibration import TABLE_TERMS, CalibrationHeader, TactileCalibration
@@ -64,6 +64,11 @@ def read_published(path: Path, pitch: float, background: ByteArray | None = None
     table = read_table(folder / TABLE)
     seen = _background(folder) if background is None else background
     rows, columns = seen.shape[:2]
+    sensor = TactileSensor("published", rows, columns, pitch, gel_thickness=np.inf)
+    if rows >= _TAXIM_ROWS:
+        skirt = skirt_for(sensor, TAXIM_SKIRT, _TAXIM_PITCH)
+    else:
+        skirt = skirt_for(sensor, R15_SKIRT)
     header = CalibrationHeader(
         sensor=folder.name,
         serial="published",
@@ -77,7 +82,7 @@ def read_published(path: Path, pitch: float, background: ByteArray | None = None
         held_out_table_db=0.0,
         residual_rms=float("inf"),
         condition=float("inf"),
-        skirt=_skirt(rows, columns, pitch),
+        skirt=skirt,
     )
     bins = len(table)
     calibration = TactileCalibration(
@@ -148,10 +153,3 @@ def _surface(path: Path, rows: int, columns: int) -> FloatArray:
         )
     checked: FloatArray = surface
     return checked
-
-
-def _skirt(rows: int, columns: int, pitch: float) -> GelSkirt:
-    sensor = TactileSensor("published", rows, columns, pitch, gel_thickness=np.inf)
-    if rows >= _TAXIM_ROWS:
-        return skirt_for(sensor, TAXIM_SKIRT, _TAXIM_PITCH)
-    return skirt_for(sensor, R15_SKIRT)

@@ -70,21 +70,16 @@ def filled(
         return tetrahedra(kept["nodes"], kept["cells"]), True
     took = FillingSeconds() if spent is None else spent
     begun, worked = time.perf_counter(), time.process_time()
-    found = _fine(mesh, edge, envelope)
+    found = tetrahedralize(mesh, edge, envelope)
+    ends = found.nodes[found.cells[:, EDGES]]
+    # Once more where it stopped with edges much longer than asked for.
+    if float(np.sqrt(((ends[:, :, 0] - ends[:, :, 1]) ** 2).sum(axis=2).mean())) > _LONGER * edge:
+        found = tetrahedralize(mesh, edge, envelope, _STRICTER)
     took.wall, took.cpu = time.perf_counter() - begun, time.process_time() - worked
     if store is not None:
         seconds = np.array([took.wall, took.cpu])
         store.put(key, {"nodes": found.nodes, "cells": found.cells, "seconds": seconds})
     return found, False
-
-
-def _fine(mesh: Mesh, edge: float, envelope: float | None) -> Tetrahedra:
-    """Filled, and once more where it stopped with edges much longer than asked for."""
-    found = tetrahedralize(mesh, edge, envelope)
-    ends = found.nodes[found.cells[:, EDGES]]
-    if float(np.sqrt(((ends[:, :, 0] - ends[:, :, 1]) ** 2).sum(axis=2).mean())) <= _LONGER * edge:
-        return found
-    return tetrahedralize(mesh, edge, envelope, _STRICTER)
 
 
 def with_edges_below(mesh: Mesh, longest: float) -> Mesh:

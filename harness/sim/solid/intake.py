@@ -143,12 +143,24 @@ def take_in(
     surface = _cleaned(raw, path.name)
     unit, source, metres = _unit(units, raw, surface.size, path.name)
     surface.vertices = surface.vertices * (metres * scale)
-    _check_size(surface.size, unit, scale, path.name)
-    pieces, watertight = _closed(surface)
+    if not _SMALLEST <= surface.size <= _LARGEST:
+        raise MeshRefused(
+            f"{path.name}: read in {unit} at scale {scale:g} the longest side is {surface.size:.4g} m, "
+            f"outside {_SMALLEST * 1e3:g} mm to {_LARGEST:g} m; say other units or another scale"
+        )
+    orient(surface)
+    fill_holes(surface)
+    pieces = join_bodies(surface)
+    watertight = is_watertight(surface.faces)
     drop_flat(surface)
     mesh = Mesh(surface.vertices, surface.faces)
-    longest = float((mesh.bounds[1] - mesh.bounds[0]).max())
-    _check_wall(wall, mesh)
+    sides = mesh.bounds[1] - mesh.bounds[0]
+    thinnest = float(sides.min())
+    if wall is not None and thinnest > 0.0 and wall > 0.5 * thinnest:
+        raise WrongUse(
+            f"a wall of {wall * 1e3:g} mm is more than half of the object's thinnest side, "
+            f"{thinnest * 1e3:.3g} mm; say a thinner wall, or leave it out for a solid"
+        )
     report = IntakeReport(
         file=path.name,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
@@ -161,7 +173,7 @@ def take_in(
         faces=len(mesh.faces),
         bodies=pieces,
         watertight=watertight,
-        longest_side=longest,
+        longest_side=float(sides.max()),
         area=float(mesh.face_areas.sum()),
         volume=signed_volume(mesh) if watertight else None,
         wall=wall,
@@ -209,13 +221,6 @@ def _cleaned(raw: RawMesh, name: str) -> RepairedSurface:
     return surface
 
 
-def _closed(surface: RepairedSurface) -> tuple[int, bool]:
-    orient(surface)
-    fill_holes(surface)
-    pieces = join_bodies(surface)
-    return pieces, is_watertight(surface.faces)
-
-
 def _unit(asked: str | None, raw: RawMesh, size: float, name: str) -> tuple[str, str, float]:
     """The unit's name, where it came from, and its length in metres."""
     declared = raw.unit
@@ -235,23 +240,6 @@ def _unit(asked: str | None, raw: RawMesh, size: float, name: str) -> tuple[str,
     said = " or ".join(f"{size:.4g} {unit} ({size * METRES[unit]:.3g} m)" for unit in readings)
     ways = " or ".join(f"--units {unit}" for unit in readings)
     raise WrongUse(f"{name}: the longest side is {size:.4g}: {said}? say {ways}")
-
-
-def _check_size(size: float, unit: str, scale: float, name: str) -> None:
-    if not _SMALLEST <= size <= _LARGEST:
-        raise MeshRefused(
-            f"{name}: read in {unit} at scale {scale:g} the longest side is {size:.4g} m, outside "
-            f"{_SMALLEST * 1e3:g} mm to {_LARGEST:g} m; say other units or another scale"
-        )
-
-
-def _check_wall(wall: float | None, mesh: Mesh) -> None:
-    thinnest = float((mesh.bounds[1] - mesh.bounds[0]).min())
-    if wall is not None and thinnest > 0.0 and wall > 0.5 * thinnest:
-        raise WrongUse(
-            f"a wall of {wall * 1e3:g} mm is more than half of the object's thinnest side, "
-            f"{thinnest * 1e3:.3g} mm; say a thinner wall, or leave it out for a solid"
-        )
 
 
 def _warnings(mesh: Mesh, watertight: bool, pieces: int, wall: float | None) -> tuple[str, ...]:

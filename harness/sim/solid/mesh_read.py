@@ -80,8 +80,11 @@ def read_mesh(path: Path, up_axis: str | None = None) -> RawMesh:
         raise MeshRefused(f"{path.name} is empty (0 bytes); export it again")
     kind = mesh_kind(path)
     read = _plain if kind in _PLAIN else _declaring if kind in DECLARING else _with_meshio
-    if read is _with_meshio and not _known_to_meshio(kind):
-        raise MeshRefused(f"{path.name}: {kind or 'no ending'} is not that of a mesh; give {_OFTEN}")
+    if read is _with_meshio:
+        import meshio
+
+        if kind not in meshio.extension_to_filetypes:
+            raise MeshRefused(f"{path.name}: {kind or 'no ending'} is not that of a mesh; give {_OFTEN}")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -175,7 +178,11 @@ def _with_meshio(path: Path) -> RawMesh:
     if kinds:
         sides = sum(len(part) for part in faces)
         notes = (f"{sides} faces of named sides are no surface of their own: left out",) if sides else ()
-        faces = [_outside(_tetrahedra(mesh, kinds, path.name))]
+        # The faces that belong to one tetrahedron only.
+        outward = _tetrahedra(mesh, kinds, path.name)[:, _TETRAHEDRON].reshape(-1, 3)
+        corners = np.sort(outward, axis=1)
+        _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
+        faces = [outward[first[count == 1]]]
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
     every = np.vstack([np.zeros((0, 3), np.int64), *faces])
@@ -212,12 +219,6 @@ def read_cells(path: Path) -> CellFile:
     return CellFile(np.asarray(found.points, np.float64), cells, found.point_sets, (), single)
 
 
-def _known_to_meshio(kind: str) -> bool:
-    import meshio
-
-    return kind in meshio.extension_to_filetypes
-
-
 def _triangles_of(kind: str, cells: IntArray) -> IntArray:
     """Faces of surface cells of any order, by their corner nodes; none of other cells."""
     if kind.startswith("triangle"):
@@ -225,11 +226,3 @@ def _triangles_of(kind: str, cells: IntArray) -> IntArray:
     if kind.startswith("quad"):
         return np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
     return np.zeros((0, 3), np.int64)
-
-
-def _outside(tetrahedra: IntArray) -> IntArray:
-    """Faces that belong to one tetrahedron only."""
-    every = tetrahedra[:, _TETRAHEDRON].reshape(-1, 3)
-    _, first, count = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
-    outside: IntArray = every[first[count == 1]]
-    return outside

@@ -288,7 +288,11 @@ def join_bodies(surface: RepairedSurface) -> int:
         return count
     # Seen from a vertex: a solid's coordinates are float32.
     centre = surface.vertices[0].copy()
-    parts = [_solid(surface.vertices - centre, surface.faces[body == k]) for k in range(count)]
+    vertices = (surface.vertices - centre).astype(np.float32)
+    parts = []
+    for k in range(count):
+        used, inverse = np.unique(surface.faces[body == k], return_inverse=True)
+        parts.append(Manifold(ManifoldMesh(vertices[used], inverse.reshape(-1, 3).astype(np.uint32))))
     # A wall of a cavity is a body of negative volume: only whole solids can be united.
     if any(part.status() != Error.NoError or part.volume() <= 0.0 for part in parts):
         return count
@@ -301,13 +305,6 @@ def join_bodies(surface: RepairedSurface) -> int:
     surface.faces = np.asarray(raw.tri_verts, np.int64)
     surface.repairs.append(f"joined {count} overlapping bodies into {after}")
     return after
-
-
-def _solid(vertices: FloatArray, faces: IntArray) -> Manifold:
-    used, inverse = np.unique(faces, return_inverse=True)
-    return Manifold(
-        ManifoldMesh(vertices[used].astype(np.float32), inverse.reshape(-1, 3).astype(np.uint32)),
-    )
 
 
 def take_apart(surface: RepairedSurface) -> None:

@@ -109,7 +109,9 @@ def read_stl(path: Path) -> PlainMesh:
     data = unpack(
         read_bounded(path, "an STL", MOST_DATA, MeshRefused), path, "an STL", MOST_DATA, MeshRefused
     )
-    if not _is_exactly_binary(data):
+    # A binary STL is known by its length: many a header begins with ``solid``, as a text does.
+    announced = int.from_bytes(data[_STL_HEADER - 4 : _STL_HEADER], "little")
+    if len(data) != _STL_HEADER + announced * _STL_FACET.itemsize:
         text = plain_bytes(data, path, MeshRefused)
         if text.lstrip()[:5].lower() == b"solid" and b"\0" not in text[:_STL_HEADER]:
             return _text_stl(text, path.name)
@@ -244,12 +246,6 @@ def _counted(words: list[bytes], points: int, name: str, line: int) -> list[int]
             f"its {points}; the file is cut short or damaged, export it again"
         )
     return corners
-
-
-def _is_exactly_binary(data: bytes) -> bool:
-    """Test for the length of a binary STL: many a header begins with ``solid``, as a text does."""
-    announced = int.from_bytes(data[_STL_HEADER - 4 : _STL_HEADER], "little")
-    return len(data) == _STL_HEADER + announced * _STL_FACET.itemsize
 
 
 def _text_stl(data: bytes, name: str) -> PlainMesh:

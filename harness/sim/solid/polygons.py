@@ -3,7 +3,7 @@
 import numpy as np
 from manifold3d import triangulate
 
-from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.basics.arrays import FloatArray, IntArray
 
 
 def triangulated(vertices: FloatArray, corners: IntArray, lengths: IntArray) -> IntArray:
@@ -29,20 +29,16 @@ def _triangles(vertices: FloatArray, polygons: IntArray) -> IntArray:
     corners = polygons.shape[1]
     if corners == 3:
         return polygons
-    convex = _convex(vertices[polygons])
+    # Convex: all corners turn the same way, none of them straight on.
+    places = vertices[polygons]
+    sides = np.roll(places, -1, axis=1) - places
+    turns = np.cross(np.roll(sides, 1, axis=1), sides)
+    convex = (np.einsum("pkd,pd->pk", turns, _normals(places)) > 0.0).all(axis=1)
     second = np.arange(1, corners - 1)
     fan = np.stack([np.zeros_like(second), second, second + 1], axis=1)
     fans = polygons[convex][:, fan].reshape(-1, 3)
     others = [polygon[_clipped(vertices[polygon], fan)] for polygon in polygons[~convex]]
     return np.concatenate([fans, *others])
-
-
-def _convex(corners: FloatArray) -> BoolArray:
-    """``(p,)`` whether all corners of ``(p, k, 3)`` polygons turn the same way, none of them straight on."""
-    sides = np.roll(corners, -1, axis=1) - corners
-    turns = np.cross(np.roll(sides, 1, axis=1), sides)
-    normals = _normals(corners)
-    return np.asarray((np.einsum("pkd,pd->pk", turns, normals) > 0.0).all(axis=1))
 
 
 def _normals(corners: FloatArray) -> FloatArray:

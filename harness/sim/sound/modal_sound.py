@@ -107,7 +107,12 @@ def ring(
     light = heard & ~heavy
     sound = _blocks(frequencies[light], dampings[light], amplitudes[:, light], force, rate)
     if heavy.any():
-        sound += _direct(frequencies[heavy], dampings[heavy], amplitudes[:, heavy], force, rate)
+        # Modes near or beyond critical damping, whose answer is short or no wave at all.
+        heavy_modes = np.arange(force.shape[1]) / rate, frequencies[heavy], dampings[heavy]
+        kernels = np.real(amplitudes[:, heavy]) @ impulse_response(*heavy_modes) / rate
+        if np.iscomplexobj(amplitudes):
+            kernels += np.imag(amplitudes[:, heavy]) @ impulse_response(*heavy_modes, True) / rate
+        sound += oaconvolve(force, kernels, axes=1)[:, : force.shape[1]]
     return sound
 
 
@@ -157,18 +162,6 @@ def _powers(exponents: AnyArray, steps: AnyArray) -> AnyArray:
     powers: AnyArray = np.exp(arguments)
     powers[arguments.real < _LOWEST] = 0.0
     return powers
-
-
-def _direct(
-    frequencies: FloatArray, dampings: FloatArray, amplitudes: AnyArray, force: FloatArray, rate: float
-) -> FloatArray:
-    """Modes near or beyond critical damping, whose answer is short or no wave at all."""
-    times = np.arange(force.shape[1]) / rate
-    kernels = np.real(amplitudes) @ impulse_response(times, frequencies, dampings) / rate
-    if np.iscomplexobj(amplitudes):
-        kernels += np.imag(amplitudes) @ impulse_response(times, frequencies, dampings, True) / rate
-    answered: FloatArray = oaconvolve(force, kernels, axes=1)[:, : force.shape[1]]
-    return answered
 
 
 def check_modes(frequencies: FloatArray, dampings: FloatArray, amplitudes: AnyArray) -> None:

@@ -25,7 +25,7 @@ from itertools import islice, permutations
 import numpy as np
 from scipy.ndimage import label
 
-from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
+from harness.basics.arrays import FloatArray, IntArray, block_means, read_only
 from harness.sim.optics.lit_calibration import place_terms
 from harness.sim.optics.poisson import free_heights
 from harness.sim.optics.shading import POSITION_TERMS, design, scaled_position
@@ -348,10 +348,14 @@ def slope_fit(change: FloatArray, calibration: TactileCalibration, block: int) -
     curled = (right - slopes[..., 0]) ** 2 + (down - slopes[..., 1]) ** 2
     whole = float((slopes[strong] ** 2).sum())
     surface = 1.0 - float(curled[strong].sum()) / max(whole, 1e-12)
-    rest = _around(size < _QUIET**2)
-    if rest is None:
+    # The rest is the quiet region that makes up most of the picture's edge. Flat parts of a contact are quiet
+    # too, and higher than the rest: beside one that leaves the picture either may be the rest.
+    labels, count = label(size < _QUIET**2)
+    edge = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    shares = np.bincount(edge, minlength=count + 1)[1:] / len(edge)
+    if count == 0 or shares.max() < _MOST_OF_EDGE:
         return SlopeFit(explained, surface, 0.0)
-    above = heights[strong] - float(heights[rest].mean())
+    above = heights[strong] - float(heights[labels == 1 + int(shares.argmax())].mean())
     return SlopeFit(explained, surface, float(above.mean() / max(float(np.abs(above).mean()), 1e-12)))
 
 
@@ -375,20 +379,6 @@ def _slopes(normal: FloatArray) -> FloatArray:
     sine = np.hypot(normal[..., 0], normal[..., 1])
     held = normal * np.minimum(1.0, _STEEPEST / np.maximum(sine, 1e-9))[..., None]
     return np.asarray(-held / np.sqrt(1.0 - (held**2).sum(axis=2, keepdims=True)))
-
-
-def _around(quiet: BoolArray) -> BoolArray | None:
-    """The quiet region that makes up most of the picture's edge; None where none does.
-
-    Flat parts of a contact are quiet too, and higher than the rest: beside one that leaves the picture either
-    may be the rest.
-    """
-    labels, count = label(quiet)
-    edge = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
-    shares = np.bincount(edge, minlength=count + 1)[1:] / len(edge)
-    if count == 0 or shares.max() < _MOST_OF_EDGE:
-        return None
-    return np.asarray(labels == 1 + int(shares.argmax()))
 
 
 @lru_cache(maxsize=8)
