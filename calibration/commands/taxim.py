@@ -389,10 +389,18 @@ def chosen(folder: Path | None, wanted: PressRequest) -> None:
 
 def pressed(wanted: PressRequest, as_json: bool) -> Path | None:
     """The folder of the run that the arm made or went on with; None where Ctrl-C ended it early."""
+    from calibration.taxim.arm.record import NAME
     from calibration.taxim.arm.session import procedure
+    from harness.experiment.lookup import require_of
     from harness.experiment.perform import describe_bench, perform_on_bench, steps_planned
+    from harness.recording.recording import Recording
 
-    recording, presses = _recording(wanted), procedure()
+    if wanted.resume is None:
+        recording = _begun(wanted)
+    else:
+        recording = Recording(wanted.resume)
+        require_of(recording, NAME, "--resume")
+    presses = procedure()
     total = steps_planned(presses, recording)
     if recording.committed < total:
         CONSOLE.print(f"bench: {describe_bench(recording)}", markup=False)
@@ -408,18 +416,6 @@ def pressed(wanted: PressRequest, as_json: bool) -> Path | None:
             stopped(f"{presses.step} {recording.committed}", recording.folder, how, as_json)
             return None
     return recording.folder
-
-
-def _recording(wanted: PressRequest) -> "Recording":
-    from calibration.taxim.arm.record import NAME
-    from harness.experiment.lookup import require_of
-    from harness.recording.recording import Recording
-
-    if wanted.resume is not None:
-        recording = Recording(wanted.resume)
-        require_of(recording, NAME, "--resume")
-        return recording
-    return _begun(wanted)
 
 
 def _begun(wanted: PressRequest) -> "Recording":

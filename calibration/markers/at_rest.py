@@ -107,7 +107,17 @@ def markers_at_rest(pictures: Sequence[ByteArray], printed: Printed) -> RestingM
         lattice = lay_lattice(dots.places)
         misprinted = _resting(dots, lattice)
         wander = _wander(pictures, dots, lattice)
-        scale = None if printed.spacing is None else _scale(dots, lattice, printed.spacing)
+        scale: ArmScale | None = None
+        if printed.spacing is not None:
+            # The print's rows are the gel's own x; errors are those of the places.
+            on = lattice.on
+            on_gel = printed.spacing * lattice.index[on].astype(np.float64)
+            try:
+                scale = arm_scale([dots.places[on]], on_gel)
+            except CalibrationRefused as refused:
+                raise CalibrationRefused(
+                    f"the print is no scale of {1e3 * printed.spacing:g} mm: {refused}"
+                ) from refused
     pitch = printed.pitch if scale is None else scale.pitch.value
     return RestingMarkers(
         read_only(mean), dots, lattice, scale, pitch, wander, misprinted, perf_counter() - began
@@ -151,15 +161,6 @@ def _wander(pictures: Sequence[ByteArray], dots: Dots, lattice: DotLattice) -> f
             "was touched in some, or the sensor moved in its mount"
         )
     return wander
-
-
-def _scale(dots: Dots, lattice: DotLattice, spacing: float) -> ArmScale:
-    """The picture on the gel, where the print's rows are the gel's own x; errors are those of the places."""
-    on = lattice.on
-    try:
-        return arm_scale([dots.places[on]], spacing * lattice.index[on].astype(np.float64))
-    except CalibrationRefused as refused:
-        raise CalibrationRefused(f"the print is no scale of {1e3 * spacing:g} mm: {refused}") from refused
 
 
 def lay_lattice(places: FloatArray) -> DotLattice:

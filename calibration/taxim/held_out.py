@@ -282,7 +282,17 @@ def colour_misfit(
             left.append(_products(place, shown - seen, int(2.0 * radius) + 2))
     total, pairs = (np.sum(part, axis=0) for part in zip(*left, strict=True))
     covariance = np.asarray(total / np.maximum(pairs, 1.0))
-    return _fitted(covariance, pairs, ball, max(_FARTHEST * radius, _NOISE + _FEWEST - 1))
+    farthest = max(_FARTHEST * radius, _NOISE + _FEWEST - 1)
+    apart = np.arange(_NOISE, int(farthest) + 1)
+    (variance, alike), _ = curve_fit(
+        _covariance,
+        apart / ball,
+        covariance[apart],
+        p0=(max(float(covariance[_NOISE]), 1e-3), 0.2),
+        sigma=1.0 / np.sqrt(np.maximum(pairs[apart], 1.0)),
+        bounds=([0.0, _ALIKE[0]], [np.inf, _ALIKE[1]]),
+    )
+    return ColourMisfit(float(np.sqrt(variance)), float(alike))
 
 
 def _products(place: IntArray, left: FloatArray, reach: int) -> tuple[FloatArray, FloatArray]:
@@ -300,20 +310,6 @@ def _products(place: IntArray, left: FloatArray, reach: int) -> tuple[FloatArray
     pairs = correlate(there, there, method="fft")
     of_products, of_pairs = (np.bincount(apart, each.ravel(), reach) for each in (total, pairs))
     return of_products.astype(np.float64), of_pairs.astype(np.float64)
-
-
-def _fitted(covariance: FloatArray, pairs: FloatArray, ball: float, farthest: float) -> ColourMisfit:
-    apart = np.arange(_NOISE, int(farthest) + 1)
-    sine, seen = apart / ball, covariance[apart]
-    (variance, alike), _ = curve_fit(
-        _covariance,
-        sine,
-        seen,
-        p0=(max(float(seen[0]), 1e-3), 0.2),
-        sigma=1.0 / np.sqrt(np.maximum(pairs[apart], 1.0)),
-        bounds=([0.0, _ALIKE[0]], [np.inf, _ALIKE[1]]),
-    )
-    return ColourMisfit(float(np.sqrt(variance)), float(alike))
 
 
 def _covariance(apart: FloatArray, variance: float, alike: float) -> FloatArray:

@@ -134,6 +134,13 @@ def calibrate(
         CalibrationRefused: a set too damaged, or a fit too poor.
     """
     began = perf_counter()
+    smallest = min(pictures.background.shape[:2])
+    if not _SMALLEST_BALL <= identity.ball <= 0.5 * smallest:
+        raise CalibrationRefused(
+            f"a ball of {1e3 * identity.ball_radius:g} mm at {1e3 * identity.pitch:g} mm a pixel has a "
+            f"radius of {identity.ball:.1f} px; between {_SMALLEST_BALL:g} px and half the picture "
+            f"({smallest / 2:g} px) is wanted: check radius (not diameter) and pitch"
+        )
     # Products of a few hundred rows: threads cost more in waiting for one another than they compute.
     with threadpool_limits(limits=1, user_api="blas"):
         made = _calibrated(pictures, identity, use_marks, like)
@@ -144,7 +151,6 @@ def _calibrated(
     pictures: Pictures, identity: Identity, use_marks: bool, like: TactileCalibration | None
 ) -> MarkFree:
     ball = identity.ball
-    _check_ball(identity, pictures)
     ordered = in_order_of_content(pictures)
     pack, kept, refused = _usable(ordered, ball, use_marks)
     change = changes(pack)
@@ -192,16 +198,6 @@ def _calibrated(
         pictures.background_from,
         0.0,
     )
-
-
-def _check_ball(identity: Identity, pictures: Pictures) -> None:
-    smallest = min(pictures.background.shape[:2])
-    if not _SMALLEST_BALL <= identity.ball <= 0.5 * smallest:
-        raise CalibrationRefused(
-            f"a ball of {1e3 * identity.ball_radius:g} mm at {1e3 * identity.pitch:g} mm a pixel has a "
-            f"radius of {identity.ball:.1f} px; between {_SMALLEST_BALL:g} px and half the picture "
-            f"({smallest / 2:g} px) is wanted: check radius (not diameter) and pitch"
-        )
 
 
 def _usable(pictures: Pictures, ball: float, use_marks: bool) -> tuple[PressPack, IntArray, list[Refused]]:

@@ -205,7 +205,14 @@ def located(
         return found
     less_sure = replace(readings, prior=readings.prior.times(factor))
     wider = _located_at(errors.times(factor), less_sure, accuracy)[-1]
-    return (*found[:-1], _widened(found[-1], wider, factor))
+    # The seconds are those of both answers but for the images.
+    before = {stage: took for stage, took in found[-1].seconds.items() if stage != "images"}
+    seconds = {stage: took + before.get(stage, 0.0) for stage, took in wider.seconds.items()}
+    doubt = (
+        f"the readings are {factor:.1f} times further off than the station's [errors] allow, by the fit's "
+        "own residuals: the region is that of errors so large; check the bench, or state them"
+    )
+    return (*found[:-1], replace(wider, seconds=seconds, doubts=(*wider.doubts, doubt)))
 
 
 def _located_at(
@@ -228,17 +235,6 @@ def _located_at(
     seconds = readings.shared[1] if images else 0.0
     model, prior, seed = readings.model, readings.prior, readings.seed
     return locate(contacts, model, prior, accuracy, noise, seed, first, seconds, strikes, judged)
-
-
-def _widened(stated: Estimate, wider: Estimate, factor: float) -> Estimate:
-    """The answer under errors larger than stated; its seconds are those of both but for the images."""
-    before = {stage: took for stage, took in stated.seconds.items() if stage != "images"}
-    seconds = {stage: took + before.get(stage, 0.0) for stage, took in wider.seconds.items()}
-    doubt = (
-        f"the readings are {factor:.1f} times further off than the station's [errors] allow, by the fit's "
-        "own residuals: the region is that of errors so large; check the bench, or state them"
-    )
-    return replace(wider, seconds=seconds, doubts=(*wider.doubts, doubt))
 
 
 @dataclass(frozen=True, eq=False)

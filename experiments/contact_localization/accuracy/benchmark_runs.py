@@ -33,7 +33,6 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import TouchstoneError
 from harness.basics.geometry import rotation_about
 from harness.basics.mesh import Mesh
-from harness.bench.bench_errors import USUAL
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station import RunContext
 from harness.bench.station_file import Station
@@ -252,17 +251,14 @@ def _case(
         ),
     )
     observations, true_points = recorded
-    prior = believed(turned.base_from_object(mesh)[:3, :3], cell, station.errors.yaw)
-    return Case(cell, Run(observations, own, prior, cell.seed, name), true_points, mesh)
-
-
-def believed(base_from_object: FloatArray, cell: Cell, yaw_sigma: float = USUAL.yaw) -> Prior:
-    """What an estimator is told of the object's orientation ``(3, 3)``: its yaw is known or unknown to it."""
+    base_from_object = turned.base_from_object(mesh)[:3, :3]
     if cell.yaw == "known":
-        return Prior(base_from_object, "known", yaw_sigma)
-    # Turned by chance, so that the unknown yaw falls between the grid's yaws, not on one of them.
-    angle = float(np.random.default_rng((cell.seed, 11)).uniform(0.0, 2.0 * np.pi))
-    return Prior(rotation_about(np.array([0.0, 0.0, 1.0]), angle) @ base_from_object, "unknown")
+        prior = Prior(base_from_object, "known", station.errors.yaw)
+    else:
+        # Turned by chance, so that the unknown yaw falls between the grid's yaws, not on one of them.
+        angle = float(np.random.default_rng((cell.seed, 11)).uniform(0.0, 2.0 * np.pi))
+        prior = Prior(rotation_about(np.array([0.0, 0.0, 1.0]), angle) @ base_from_object, "unknown")
+    return Case(cell, Run(observations, own, prior, cell.seed, name), true_points, mesh)
 
 
 def performed(

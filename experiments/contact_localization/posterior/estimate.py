@@ -328,36 +328,23 @@ def solve_run(
         return _by_particles(search, count, members, accuracy, seed, seconds)
     best: PosteriorSolution | None = None
     clear = -np.inf
+    samples = accuracy.of(SAMPLES) * (1 if search.prior.yaw == "known" else _UNKNOWN_YAW_FACTOR)
     for anchor in anchors(members, _ANCHORS):
-        found = _by_grid(search, members, int(anchor), accuracy, seed, seconds, heard)
-        likeness = likeness_of(search, members, found.fits)
+        start = time.perf_counter()
+        coarse = on_samples(search, members, int(anchor), heard)
+        lap(seconds, "grid", start)
+        start = time.perf_counter()
+        refined = refine(search, coarse, members, samples, accuracy.of(ROUNDS), seed, heard)
+        fits = search.gates(refined.top, members)
+        lap(seconds, "refine", start)
+        likeness = likeness_of(search, members, fits)
         if best is None or likeness.margin > clear:
-            best, clear = found, likeness.margin
-        of_anchor = float(found.fits[np.nonzero(members == anchor)[0][0]])
+            best, clear = PosteriorSolution(refined, members, fits), likeness.margin
+        of_anchor = float(fits[np.nonzero(members == anchor)[0][0]])
         if min(of_anchor, likeness.typical) > _SUSPICIOUS_BELOW and likeness.margin > 0.0:
             break
     assert best is not None
     return best
-
-
-def _by_grid(
-    search: Search,
-    members: IntArray,
-    anchor: int,
-    accuracy: Accuracy,
-    seed: int,
-    seconds: dict[str, float],
-    heard: StrikeEvidence | None,
-) -> PosteriorSolution:
-    start = time.perf_counter()
-    coarse = on_samples(search, members, anchor, heard)
-    lap(seconds, "grid", start)
-    start = time.perf_counter()
-    samples = accuracy.of(SAMPLES) * (1 if search.prior.yaw == "known" else _UNKNOWN_YAW_FACTOR)
-    refined = refine(search, coarse, members, samples, accuracy.of(ROUNDS), seed, heard)
-    fits = search.gates(refined.top, members)
-    lap(seconds, "refine", start)
-    return PosteriorSolution(refined, members, fits)
 
 
 def _by_particles(

@@ -138,7 +138,17 @@ def credible_region(
     """
     # A posterior along a whole rim needs many points: each fills only a few square millimetres.
     points, weights = thinned(points, weights, _MOST_IN_REGION)
-    mass = _spread_over(surface, points, weights, floor)
+    # The points' weights, each shared by the samples around it as a Gaussian of the area.
+    near = [np.asarray(found, dtype=np.int64) for found in surface.tree.query_ball_point(points, 4.0 * floor)]
+    counts = np.array([len(found) for found in near])
+    far = np.nonzero(counts == 0)[0]
+    owners = np.concatenate([np.repeat(np.arange(len(points)), counts), far])
+    samples = np.concatenate([*near, surface.tree.query(points[far])[1]]).astype(np.int64)
+    gaps = np.sum((surface.points[samples] - points[owners]) ** 2, axis=1)
+    kernel = surface.areas[samples] * np.exp(-0.5 * gaps / floor**2) + 1e-300
+    whole = np.bincount(owners, kernel, minlength=len(points))
+    shares = weights[owners] * kernel / whole[owners]
+    mass = np.bincount(samples, shares, minlength=len(surface.points))
     density = mass / np.maximum(surface.areas, 1e-12)
     order = np.argsort(-density, kind="stable")
     count = int(np.searchsorted(np.cumsum(mass[order]), share * mass.sum())) + 1
@@ -146,20 +156,6 @@ def credible_region(
     inside[order[:count]] = True
     area = float(surface.areas[inside].sum())
     return Region(share, read_only(surface.points[inside]), area, surface, read_only(inside))
-
-
-def _spread_over(surface: Surface, points: FloatArray, weights: FloatArray, width: float) -> FloatArray:
-    """``(samples,)``: the points' weights, each shared by the samples around it as a Gaussian of the area."""
-    near = [np.asarray(found, dtype=np.int64) for found in surface.tree.query_ball_point(points, 4.0 * width)]
-    counts = np.array([len(found) for found in near])
-    far = np.nonzero(counts == 0)[0]
-    owners = np.concatenate([np.repeat(np.arange(len(points)), counts), far])
-    samples = np.concatenate([*near, surface.tree.query(points[far])[1]]).astype(np.int64)
-    gaps = np.sum((surface.points[samples] - points[owners]) ** 2, axis=1)
-    kernel = surface.areas[samples] * np.exp(-0.5 * gaps / width**2) + 1e-300
-    whole = np.bincount(owners, kernel, minlength=len(points))
-    shares = weights[owners] * kernel / whole[owners]
-    return np.asarray(np.bincount(samples, shares, minlength=len(surface.points)))
 
 
 def credible_radius(

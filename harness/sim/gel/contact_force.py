@@ -246,21 +246,18 @@ def _pressed(
             alone = np.where(parts[box] == k + 1, merged[box], 0.0)
             pascals[box] += _Search(alone, side, thickness, gel).springs()
     else:
-        pascals = _settled(contact_pressure(merged, side, thickness, gel))
+        found = contact_pressure(merged, side, thickness, gel)
+        if found.left > SETTLED:
+            raise OutOfDomain(
+                f"the pressures did not settle in {found.turns} turns: {found.left:.2g} of the energy is "
+                f"left, and the limit is {SETTLED:g}; take larger squares, --level touch.force_cells=4, or "
+                "--level touch.force=winkler"
+            )
+        pascals = found.pascals
     # A square at the border may reach past the picture: what it carries is put on the pixels that are seen.
     spread = pascals.repeat(cells, axis=0).repeat(cells, axis=1)[: depth.shape[0], : depth.shape[1]]
     whole = spread.sum()
     return np.asarray(spread * (pascals.sum() * cells**2 / whole if whole > 0.0 else 1.0))
-
-
-def _settled(found: Pressure) -> FloatArray:
-    if found.left > SETTLED:
-        raise OutOfDomain(
-            f"the pressures did not settle in {found.turns} turns: {found.left:.2g} of the energy is left, "
-            f"and the limit is {SETTLED:g}; take larger squares, --level touch.force_cells=4, or "
-            "--level touch.force=winkler"
-        )
-    return found.pascals
 
 
 def _contacts(depth: FloatArray) -> IntArray:

@@ -70,7 +70,14 @@ def given_heights(heights: FloatArray, sensor: TactileSensor, of: Heights, name:
     Raises:
         OutOfDomain: as ``read_heights``.
     """
-    _check_shape(heights, sensor, name)
+    wanted = (sensor.rows, sensor.columns)
+    if heights.shape != wanted:
+        hint = "; transpose it" if heights.shape == wanted[::-1] else ""
+        if heights.ndim == 3 and heights.shape[1:] == wanted:
+            hint = "; write one contact of the batch"
+        raise OutOfDomain(
+            f"{name} is {heights.shape}; a height map of {sensor.name} has (rows, columns) = {wanted}{hint}"
+        )
     missing = ~np.isfinite(heights) | (heights >= _NO_HEIGHT)
     if of == "gel":
         missing |= heights <= -_NO_HEIGHT
@@ -110,18 +117,6 @@ def spanned(heights: FloatArray, missing: BoolArray) -> FloatArray:
     filled = known.copy()
     filled[which] = spsolve(pull.tocsc(), beside @ known)
     return filled.reshape(heights.shape)
-
-
-def _check_shape(heights: FloatArray, sensor: TactileSensor, name: str) -> None:
-    wanted = (sensor.rows, sensor.columns)
-    if heights.shape == wanted:
-        return
-    hint = "; transpose it" if heights.shape == wanted[::-1] else ""
-    if heights.ndim == 3 and heights.shape[1:] == wanted:
-        hint = "; write one contact of the batch"
-    raise OutOfDomain(
-        f"{name} is {heights.shape}; a height map of {sensor.name} has (rows, columns) = {wanted}{hint}"
-    )
 
 
 def _check_unit(heights: FloatArray, sensor: TactileSensor, of: Heights, name: str) -> None:

@@ -9,8 +9,8 @@ finely the surface is cut up, and has no seam.
 
 import warnings
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
+from types import MappingProxyType
 
 import numpy as np
 
@@ -177,18 +177,18 @@ def _read_with_trimesh(path: Path) -> MeshFile:
     pieces = [piece for piece in loaded.dump() if isinstance(piece, trimesh.Trimesh)]
     if not any(len(piece.faces) for piece in pieces):
         raise MeshRefused(f"{path.name} holds no triangle; export a surface")
-    return MeshFile(tuple(_part(piece) for piece in pieces))
-
-
-def _part(piece: Any) -> MeshPart:
-    visual, faces = piece.visual, np.asarray(piece.faces, np.int64)
-    tints = None
-    if visual.kind == "vertex":
-        of_vertices = linear_from_srgb(np.asarray(visual.vertex_colors, np.float64)[:, :3] / PEAK)
-        tints = np.asarray(of_vertices[faces])
-    elif visual.kind == "face":
-        tints = np.repeat(linear_from_srgb(np.asarray(visual.face_colors)[:, None, :3] / PEAK), 3, axis=1)
-    return MeshPart(np.asarray(piece.vertices, np.float64), faces, tints)
+    parts = []
+    for piece in pieces:
+        visual: Any = piece.visual
+        faces = np.asarray(piece.faces, np.int64)
+        tints = None
+        if visual.kind == "vertex":
+            of_vertices = linear_from_srgb(np.asarray(visual.vertex_colors, np.float64)[:, :3] / PEAK)
+            tints = np.asarray(of_vertices[faces])
+        elif visual.kind == "face":
+            tints = np.repeat(linear_from_srgb(np.asarray(visual.face_colors)[:, None, :3] / PEAK), 3, axis=1)
+        parts.append(MeshPart(np.asarray(piece.vertices, np.float64), faces, tints))
+    return MeshFile(tuple(parts))
 
 
 def _coloured(mesh: Mesh, read: MeshFile, crease: float) -> Appearance:

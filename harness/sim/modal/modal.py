@@ -194,7 +194,13 @@ def curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra)
     mesh = quadratic_mesh(undeformed.nodes, undeformed.cells)
     if surface is not None:
         mesh = snapped(mesh, surface)
-        _check_volume(mesh, surface)
+        got, wanted = held_volume(mesh), enclosed_volume(surface)
+        if not abs(got - wanted) <= _VOLUME_GATE * wanted:
+            raise MeshRefused(
+                f"the elements hold {got * 1e6:.4g} cm^3 where the surface encloses {wanted * 1e6:.4g}, more "
+                f"than {_VOLUME_GATE:.0%} apart; repair the surface, or say smaller elements (sim modes "
+                "--edge, run --level sound.edge)"
+            )
     if undeformed is tetrahedra:
         return mesh
     way = np.zeros_like(mesh.nodes)
@@ -210,17 +216,6 @@ def held_volume(mesh: QuadraticMesh) -> float:
     """m^3 that curved cells hold, as their mass is integrated."""
     slopes = shape_slopes(MASS_POINTS)
     return float((determinants(mesh.nodes, mesh.cells, slopes) @ MASS_WEIGHTS).sum() / 6.0)
-
-
-def _check_volume(mesh: QuadraticMesh, surface: Mesh) -> None:
-    got = held_volume(mesh)
-    wanted = enclosed_volume(surface)
-    if not abs(got - wanted) <= _VOLUME_GATE * wanted:
-        raise MeshRefused(
-            f"the elements hold {got * 1e6:.4g} cm^3 where the surface encloses {wanted * 1e6:.4g}, more "
-            f"than {_VOLUME_GATE:.0%} apart; repair the surface, or say smaller elements (sim modes --edge, "
-            "run --level sound.edge)"
-        )
 
 
 def to_arrays(modes: Modes) -> dict[str, AnyArray]:

@@ -93,22 +93,21 @@ def solve_mesh(
         with timed(seconds, "assembly"):
             system = modal_system(mesh, elasticity.lame, elasticity.density, rule)
             if held is not None and held.any():
-                system = _held(system, held, len(mesh.nodes))
+                if held.shape != mesh.nodes.shape:
+                    raise WrongUse(
+                        f"what is held has shape {held.shape}; it must be {mesh.nodes.shape}, an axis of a "
+                        "node each"
+                    )
+                if held.all():
+                    raise WrongUse(
+                        "every displacement is held, so that nothing can vibrate; leave some nodes free"
+                    )
+                system = system.held(held)
         begin(f"solving for the modes of {system.stiffness.shape[0]} unknowns")
         with timed(seconds, "solve"):
             pairs, reached = _found(system, limit, most, least)
     modes = _modes(mesh, system, pairs, reached, seconds)
     return Solution(modes, pairs.certified, system.stiffness.shape[0])
-
-
-def _held(system: ModalSystem, held: BoolArray, nodes: int) -> ModalSystem:
-    if held.shape != (nodes, 3):
-        raise WrongUse(
-            f"what is held has shape {held.shape}; it must be {(nodes, 3)}, an axis of a node each"
-        )
-    if held.all():
-        raise WrongUse("every displacement is held, so that nothing can vibrate; leave some nodes free")
-    return system.held(held)
 
 
 def _found(

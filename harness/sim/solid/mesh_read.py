@@ -178,8 +178,14 @@ def _with_meshio(path: Path) -> RawMesh:
     if kinds:
         sides = sum(len(part) for part in faces)
         notes = (f"{sides} faces of named sides are no surface of their own: left out",) if sides else ()
+        if not kinds <= TETRAHEDRA.keys():
+            raise MeshRefused(
+                f"{path.name} holds cells of kind {', '.join(sorted(kinds))}; export it as four-node "
+                "tetrahedra only, or ten-node ones only"
+            )
+        cells = np.concatenate([block.data[:, :4] for block in mesh.cells if block.type in kinds])
         # The faces that belong to one tetrahedron only.
-        outward = _tetrahedra(mesh, kinds, path.name)[:, _TETRAHEDRON].reshape(-1, 3)
+        outward = cells[:, _TETRAHEDRON].reshape(-1, 3)
         corners = np.sort(outward, axis=1)
         _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
         faces = [outward[first[count == 1]]]
@@ -187,21 +193,6 @@ def _with_meshio(path: Path) -> RawMesh:
     points[:, : mesh.points.shape[1]] = mesh.points
     every = np.vstack([np.zeros((0, 3), np.int64), *faces])
     return RawMesh(points, every, None, (*mesh.notes, *notes), mesh.single)
-
-
-def _tetrahedra(mesh: CellFile, kinds: set[str], name: str) -> IntArray:
-    """``(c, 4)``: the corners of all cells of a file of solids.
-
-    Raises:
-        MeshRefused: it holds solids of other kinds.
-    """
-    if not kinds <= TETRAHEDRA.keys():
-        raise MeshRefused(
-            f"{name} holds cells of kind {', '.join(sorted(kinds))}; export it as four-node tetrahedra only, "
-            "or ten-node ones only"
-        )
-    cells = [block.data[:, :4] for block in mesh.cells if block.type in kinds]
-    return np.concatenate(cells)
 
 
 def read_cells(path: Path) -> CellFile:

@@ -335,17 +335,6 @@ def read_ply(path: Path) -> PlainMesh:
     return PlainMesh(vertices, faces, single=single and not is_text)
 
 
-def _check_counts(data: bytes, name: str) -> None:
-    """Refuse a file of Gmsh that announces more than its bytes can hold: the library makes room for all."""
-    for found in _COUNTS.finditer(data):
-        announced = max(int(count) for count in found.groups(b"0"))
-        if announced > len(data):
-            raise MeshRefused(
-                f"{name} is cut short: it announces {announced} nodes or elements in {len(data)} bytes; "
-                "export it again"
-            )
-
-
 @contextmanager
 def plain_file(path: Path) -> Iterator[Path]:
     """Yield the path of a file that holds the same text as UTF-8 with LF line ends; binary files stay.
@@ -358,7 +347,14 @@ def plain_file(path: Path) -> Iterator[Path]:
     plain = unpack(data, path, "a mesh", MOST_DATA, MeshRefused)
     text = plain_bytes(plain, path, MeshRefused)
     plain = plain if b"\0" in text else text
-    _check_counts(plain, path.name)
+    # A file of Gmsh may announce more than its bytes can hold: the library makes room for all.
+    for found in _COUNTS.finditer(plain):
+        announced = max(int(count) for count in found.groups(b"0"))
+        if announced > len(plain):
+            raise MeshRefused(
+                f"{path.name} is cut short: it announces {announced} nodes or elements in {len(plain)} "
+                "bytes; export it again"
+            )
     if not packed and plain == data:
         yield path
         return
