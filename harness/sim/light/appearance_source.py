@@ -9,8 +9,8 @@ finely the surface is cut up, and has no seam.
 
 import warnings
 from pathlib import Path
-from typing import Any
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
