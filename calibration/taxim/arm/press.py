@@ -167,14 +167,14 @@ class BallPresses:
         wanted, last = self._settings, motion.lowest - self._settings.depth
         seen: list[Reading] = []
         way: list[float] = []
-        down = max(first, 0.0)
+        down, blur = max(first, 0.0), (_BLUR, _BLUR, 0.0)
         self._to(bench, motion, down, _APPROACH)
         while down <= last and len(seen) < wanted.pictures:
             # The frame before the last may have been exposed while the arm still moved.
             frames = bench.gel.read(2, wanted.still.timeout)
             frame = Reading(frames.channel, frames.times[-1:], frames.values[-1:], frames.encoded[-1:])
-            blurred = gaussian_filter(look(frame) - rest, (_BLUR, _BLUR, 0.0))
-            if seen or np.abs(blurred).max() >= wanted.notice:
+            # The strongest change counts, noise blurred away; once it is seen, every frame does.
+            if seen or np.abs(gaussian_filter(look(frame) - rest, blur)).max() >= wanted.notice:
                 seen.append(frame)
                 way.append(down)
                 last = min(way[0] + wanted.depth, motion.lowest - wanted.step)
