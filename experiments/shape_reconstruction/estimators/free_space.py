@@ -51,11 +51,18 @@ class Silhouette:
         known = look.mask | look.hidden
         outside = ndimage.distance_transform_edt(~known) - ndimage.distance_transform_edt(known)
         unshifted = cls(look, np.asarray(outside - np.sign(outside) * 0.5), np.zeros(2))
-        return (
-            unshifted
-            if len(contacts) == 0
-            else cls(look, unshifted.outside, _best_shift(unshifted, contacts))
-        )
+        if len(contacts) == 0:
+            return unshifted
+        # The least that brings the contacts within the silhouette, weighed against the camera's errors.
+        pixels, depth = unshifted.pixels(contacts)
+        sigma = max(shift_sigma(look, float(depth.mean())), 1e-3)
+        steps = np.arange(-SHIFTS * sigma, SHIFTS * sigma + _STEP, _STEP)
+        shifts = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+        at = (pixels[None] + shifts[:, None])[..., ::-1].reshape(-1, 2).T - 0.5
+        values = ndimage.map_coordinates(unshifted.outside, at, order=1, mode="nearest")
+        beyond = (np.maximum(values.reshape(len(shifts), -1), 0.0) / _CONTACT_BEYOND) ** 2
+        cost = beyond.sum(axis=1) + ((shifts / sigma) ** 2).sum(axis=1)
+        return cls(look, unshifted.outside, shifts[int(cost.argmin())])
 
     def pixels(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """``(n, 2)`` x and y in the picture, pixels from its corner, and ``(n,)`` m before the camera."""
@@ -83,21 +90,6 @@ def shift_sigma(look: SeenMask, depth: float) -> float:
     """Pixels, one standard deviation of where a place at ``depth`` m appears, by the camera's errors."""
     turned = look.focal_length * look.rotation_error
     return float(np.hypot(turned, look.focal_length * look.position_error / depth))
-
-
-def _best_shift(silhouette: Silhouette, contacts: FloatArray) -> FloatArray:
-    """The least that brings the contacts within the silhouette, weighed against the camera's errors."""
-    pixels, depth = silhouette.pixels(contacts)
-    sigma = max(shift_sigma(silhouette.look, float(depth.mean())), 1e-3)
-    steps = np.arange(-SHIFTS * sigma, SHIFTS * sigma + _STEP, _STEP)
-    shifts = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
-    at = (pixels[None] + shifts[:, None])[..., ::-1].reshape(-1, 2).T - 0.5
-    outside = ndimage.map_coordinates(silhouette.outside, at, order=1, mode="nearest").reshape(
-        len(shifts), -1
-    )
-    beyond = (np.maximum(outside, 0.0) / _CONTACT_BEYOND) ** 2
-    cost = beyond.sum(axis=1) + ((shifts / sigma) ** 2).sum(axis=1)
-    return np.asarray(shifts[int(cost.argmin())])
 
 
 LEAST = 12

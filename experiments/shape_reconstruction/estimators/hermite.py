@@ -83,7 +83,15 @@ class _Bounds:
         outside = np.maximum(sensor_depth(self.evidence, points) - CLEARANCE, -points[:, 2])
         near = cKDTree(self.places).query(points)[0]
         slope = SLOPE if self.room is None else ENTERED_SLOPE
-        outside = np.maximum(outside, _outside_hull(self._hull_points, points) - _HULL - slope * near)
+        try:
+            sides = ConvexHull(self._hull_points).equations
+        except QhullError:  # it is flat, and bounds nothing
+            beyond = np.full(len(points), -1.0)
+        else:
+            beyond = np.full(len(points), -np.inf)
+            for side in sides:
+                np.maximum(beyond, points @ side[:3] + side[3], out=beyond)
+        outside = np.maximum(outside, beyond - _HULL - slope * near)
         if self.room is not None:
             outside = np.maximum(outside, self.room.at(points) - SLACK)
         if self.silhouette is not None:
@@ -228,18 +236,6 @@ def _cut(field: ThinPlateField, bounds: _Bounds) -> Callable[[FloatArray], Float
         return values
 
     return cut
-
-
-def _outside_hull(of: FloatArray, points: FloatArray) -> FloatArray:
-    """``(n,)`` m beyond the farthest side of the convex hull; far below 0 for all where it is flat."""
-    try:
-        sides = ConvexHull(of).equations
-    except QhullError:
-        return np.full(len(points), -1.0)
-    beyond = np.full(len(points), -np.inf)
-    for side in sides:
-        np.maximum(beyond, points @ side[:3] + side[3], out=beyond)
-    return beyond
 
 
 RAYS = 60
