@@ -112,7 +112,10 @@ class LabChild:
 
 
 def _begin(run: Callable[[ChildPipe], None], connection: Connection, parent: int) -> None:
-    _die_with_parent(parent)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it died before it could be asked
+        os._exit(0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the lab's to answer
     # Nothing a child prints may enter the lab's answers, nor may it read what is said to the lab.
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
@@ -130,13 +133,6 @@ def keep_time() -> None:
     """Ask to be served before other processes, where the system lets us: a controller is punctual."""
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, 0, _PUNCTUAL)
-
-
-def _die_with_parent(parent: int) -> None:
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it died before it could be asked
-        os._exit(0)
 
 
 def free_address() -> str:

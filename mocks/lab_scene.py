@@ -60,7 +60,13 @@ def read_lab_scene(path: Path, draw: GapDraw) -> LabScene:
         )
     scene = scene_from_json(told["scene"], str(path))
     station = station_from_json(told["station"], str(path))
-    mesh = None if told["mesh"] is None else _read_mesh(Path(told["mesh"]))
+    mesh = None
+    if told["mesh"] is not None:
+        try:
+            with np.load(Path(told["mesh"]), allow_pickle=False) as archive:
+                mesh = Mesh(archive["vertices"], archive["faces"])
+        except (OSError, ValueError, KeyError) as error:
+            raise WrongUse(f"the lab cannot read the object's mesh {told['mesh']}: {error}") from error
     bench = nominal_bench(scene, station, mesh, np.array(told["base_from_object"]), draw)
     return LabScene(bench, scene, station)
 
@@ -81,7 +87,13 @@ def nominal_bench(
     Raises:
         WrongUse: no mesh for an object that is not built in.
     """
-    drawn = _own_tessellation(scene) if mesh is None else mesh
+    if mesh is not None:
+        drawn = mesh
+    elif scene.object.builtin is not None:
+        fine = build(scene.object.builtin, edge=EDGE)
+        drawn = Mesh(fine.vertices * scene.object.drawn_scale, fine.faces)
+    else:
+        raise WrongUse(f"the world needs the mesh of {scene.object.name}: it is not built in")
     made: float | None = None
     if scene.object.is_hidden:
         nominal = float(np.ptp(drawn.bounds, axis=0).max())
@@ -90,6 +102,10 @@ def nominal_bench(
     # Grown about its anchor, it stands where it stood.
     anchor = np.array(scene.object.pose.position)
     placed[:3, 3] = anchor + factor * (placed[:3, 3] - anchor)
+    camera = None
+    seen = station.camera
+    if seen is not None and scene.sensors.camera:
+        camera = Camera(seen.base_from_camera.matrix, seen.rows, seen.columns, seen.focal_length)
     return NominalBench(
         mesh=drawn if made is None else Mesh(made * drawn.vertices, drawn.faces),
         base_from_object=base_from_object if made is None else placed,
@@ -97,34 +113,11 @@ def nominal_bench(
         sensor=station.gel.sensor,
         calibration=station.gel.calibration,
         other_calibration=station.gel.described.world_calibration,
-        camera=_camera(scene, station),
+        camera=camera,
         furniture=Furniture(scene.table.height, scene.table.size, scene.support.width),
         made_scale=made,
         drawing=None if made is None else drawn,
     )
-
-
-def _own_tessellation(scene: SceneFile) -> Mesh:
-    name = scene.object.builtin
-    if name is None:
-        raise WrongUse(f"the world needs the mesh of {scene.object.name}: it is not built in")
-    mesh = build(name, edge=EDGE)
-    return Mesh(mesh.vertices * scene.object.drawn_scale, mesh.faces)
-
-
-def _camera(scene: SceneFile, station: Station) -> Camera | None:
-    camera = station.camera
-    if camera is None or not scene.sensors.camera:
-        return None
-    return Camera(camera.base_from_camera.matrix, camera.rows, camera.columns, camera.focal_length)
-
-
-def _read_mesh(path: Path) -> Mesh:
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            return Mesh(archive["vertices"], archive["faces"])
-    except (OSError, ValueError, KeyError) as error:
-        raise WrongUse(f"the lab cannot read the object's mesh {path}: {error}") from error
 
 
 def strikes_of(

@@ -368,9 +368,8 @@ def _list_again(library: Any) -> None:
         library._terminate()  # noqa: SLF001
         library._initialize()  # noqa: SLF001
     except library.PortAudioError as error:
-        raise BenchFault(
-            f"PortAudio did not start: {_reason(error)}; check the system's sound settings"
-        ) from error
+        reason = str(error.args[0]) if error.args else type(error).__name__
+        raise BenchFault(f"PortAudio did not start: {reason}; check the system's sound settings") from error
 
 
 def find_input(library: Any, device: str, channels: int) -> dict[str, Any]:
@@ -405,7 +404,3 @@ def _with_channels(found: dict[str, Any], channels: int) -> dict[str, Any]:
             "the device's"
         )
     return found
-
-
-def _reason(error: Exception) -> str:
-    return str(error.args[0]) if error.args else type(error).__name__

@@ -70,32 +70,24 @@ def fit_clock(indices: FloatArray, times: FloatArray, nominal_rate: float) -> Sa
     scale = _SHARPNESS
     offset = stretch = 0.0
     for _ in range(_ROUNDS):
-        offset, stretch = _line(elapsed, excess, weights, scale)
+        # The weighted line; its slope is drawn to zero as `CRYSTAL_DRIFT` demands of noise of this scale.
+        total = weights.sum()
+        mean_x, mean_y = weights @ elapsed / total, weights @ excess / total
+        spread = weights @ (elapsed - mean_x) ** 2 + (scale / CRYSTAL_DRIFT) ** 2
+        stretch = float(weights @ ((elapsed - mean_x) * (excess - mean_y)) / spread)
+        offset = float(mean_y - stretch * mean_x)
         residuals = excess - offset - stretch * elapsed
         scale = max(_SHARPNESS, _MAD_TO_DEVIATION * float(np.median(np.abs(residuals))))
         weights = np.where(residuals > scale, scale / np.maximum(residuals, scale), 1.0)
     residual = float(np.median(np.abs(excess - offset - stretch * elapsed)))
-    uncertainty = _uncertainty(elapsed, weights, scale)
+    # Standard deviation of the line at the last block, in s.
+    total = weights.sum()
+    mean = weights @ elapsed / total
+    spread = weights @ (elapsed - mean) ** 2 + (scale / CRYSTAL_DRIFT) ** 2
+    uncertainty = float(scale * np.sqrt(1.0 / total + mean**2 / spread))
     return SampleClock(
         anchor, float(times[-1]) + offset, nominal_rate / (1.0 + stretch), residual, uncertainty
     )
-
-
-def _uncertainty(x: FloatArray, weights: FloatArray, noise: float) -> float:
-    """Standard deviation in s, at ``x = 0``, of the line that `_line` draws through noise ``noise`` s."""
-    total = weights.sum()
-    mean = weights @ x / total
-    spread = weights @ (x - mean) ** 2 + (noise / CRYSTAL_DRIFT) ** 2
-    return float(noise * np.sqrt(1.0 / total + mean**2 / spread))
-
-
-def _line(x: FloatArray, y: FloatArray, weights: FloatArray, noise: float) -> tuple[float, float]:
-    """Offset and slope; the slope drawn to zero as `CRYSTAL_DRIFT` demands of noise ``noise`` s."""
-    total = weights.sum()
-    mean_x, mean_y = weights @ x / total, weights @ y / total
-    spread = weights @ (x - mean_x) ** 2 + (noise / CRYSTAL_DRIFT) ** 2
-    slope = float(weights @ ((x - mean_x) * (y - mean_y)) / spread)
-    return float(mean_y - slope * mean_x), slope
 
 
 def steps(indices: FloatArray, times: FloatArray, nominal_rate: float, settle: int) -> FloatArray:

@@ -211,7 +211,10 @@ class UrArm:
         if not session.comes_true(
             lambda p: bool(int(p[pipe.FIELDS["output_bits"]][0]) & bit) == on, SEEN_WITHIN
         ):
-            raise ur_state.not_switched(index, on)
+            raise BenchFault(
+                f"tool digital output {index} did not switch {'on' if on else 'off'}; check the tool's "
+                "supply voltage in the pendant's installation, and that no fieldbus owns the outputs"
+            )
 
     def stop(self) -> None:
         """Stop now, from any thread and in any state; no motion asked for before begins after.

@@ -72,7 +72,12 @@ def checked_controller(address: str, model: str) -> ControllerLink:
         require_mock(address, serial)
         identity = ControllerLink(board.getRobotModel().strip(), serial, board.polyscopeVersion().strip())
         remote, mode, safety = board.isInRemoteControl(), board.robotmode(), board.safetystatus()
-        _check_model(identity, model, address)
+        # The dashboard names an e-Series arm without its e.
+        if identity.model.lower().rstrip("e") != model.lower().rstrip("e"):
+            raise BenchFault(
+                f"the station says {model}; the controller at {address} is a {identity.model} "
+                f"(serial {identity.serial}): correct the station file or the address"
+            )
         _check_ready(remote, mode, safety, address)
         board.stop()
     except RuntimeError as error:
@@ -81,15 +86,6 @@ def checked_controller(address: str, model: str) -> ControllerLink:
             f"({error}); check the address and the network cable of the control box"
         ) from error
     return identity
-
-
-def _check_model(identity: ControllerLink, model: str, address: str) -> None:
-    """The dashboard names an e-Series arm without its e."""
-    if identity.model.lower().rstrip("e") != model.lower().rstrip("e"):
-        raise BenchFault(
-            f"the station says {model}; the controller at {address} is a {identity.model} "
-            f"(serial {identity.serial}): correct the station file or the address"
-        )
 
 
 def _check_ready(remote: bool, mode: str, safety: str, address: str) -> None:

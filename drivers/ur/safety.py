@@ -213,21 +213,6 @@ def check_speeds(limits: SafetyLimits, path: Path, cap: float, what: str) -> Non
         )
 
 
-def speed_cap(limits: SafetyLimits, path: Path, contact: FloatArray | None) -> float:
-    """m/s: ``speed_near`` for a path that begins or ends near the last contact, else ``speed``.
-
-    Args:
-        limits: of the station.
-        path: that is asked for.
-        contact: ``(3,)`` m in base, where the flange was at the last contact.
-    """
-    if contact is None:
-        return limits.speed
-    ends = path.flange_positions[[0, -1]]
-    near = np.linalg.norm(ends - contact, axis=-1) < limits.near
-    return limits.speed_near if bool(np.any(near)) else limits.speed
-
-
 def check_path(limits: SafetyLimits, path: Path, contact: FloatArray | None, what: str) -> None:
     """Joint range, joint step, workspace and speeds of a whole path."""
     check_joint_range(limits, path.joints, what)
@@ -239,7 +224,13 @@ def check_path(limits: SafetyLimits, path: Path, contact: FloatArray | None, wha
             f"{limits.joint_step:.3f} rad: go by way of a posture in between"
         )
     check_workspace(limits, path, what)
-    check_speeds(limits, path, speed_cap(limits, path, contact), what)
+    # A path that begins or ends near the last contact, where the flange was then, is slower.
+    cap = limits.speed
+    if contact is not None:
+        distances = np.linalg.norm(path.flange_positions[[0, -1]] - contact, axis=-1)
+        if bool(np.any(distances < limits.near)):
+            cap = limits.speed_near
+    check_speeds(limits, path, cap, what)
 
 
 def trapezoid_seconds(distance: float, speed: float, acceleration: float) -> float:

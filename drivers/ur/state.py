@@ -71,14 +71,6 @@ def not_zeroed(packet: FloatArray, limit: float, seconds: float) -> BenchFault:
     )
 
 
-def not_switched(index: int, on: bool) -> BenchFault:
-    """That a digital output at the tool stays as it is."""
-    return BenchFault(
-        f"tool digital output {index} did not switch {'on' if on else 'off'}; check the tool's supply "
-        "voltage in the pendant's installation, and that no fieldbus owns the outputs"
-    )
-
-
 def detail(packet: FloatArray) -> str:
     """Safety state and anything unusual since opening, in words."""
     words = safety_words(int(packet[pipe.FIELDS["safety_bits"]][0]))

@@ -66,7 +66,10 @@ class Recording:
     def __init__(self, folder: Path) -> None:
         """Open an existing run; ``RecordingDamaged`` or ``WrongUse`` where it is none."""
         self.folder = folder
-        self.header = _read_header(folder / HEADER)
+        require_run(folder)
+        path = folder / HEADER
+        data = read_bounded(path, "the description of a run", MOST_JSON, RecordingDamaged)
+        self.header = header_of(data, path)
         self._session_offset_ns = self.header.clock_offset_ns
 
     @classmethod
@@ -171,11 +174,6 @@ def require_unused(folder: Path) -> None:
     """Refuse a folder that holds a run, before anything in it is touched."""
     if (folder / HEADER).exists() or any((folder / STEPS).glob("[0-9]*.mcap")):
         raise WrongUse(f"{folder} holds a run already; resume it with --resume, or name another folder")
-
-
-def _read_header(path: Path) -> RunHeader:
-    require_run(path.parent)
-    return header_of(read_bounded(path, "the description of a run", MOST_JSON, RecordingDamaged), path)
 
 
 def header_of(data: bytes, path: Path) -> RunHeader:

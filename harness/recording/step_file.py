@@ -10,7 +10,7 @@ the checksum's own place counts as zeros.
 """
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from io import BytesIO
@@ -171,34 +171,21 @@ def _damaged(path: Path, why: str) -> RecordingDamaged:
 def _decoded(data: bytes, clock_offset_ns: int) -> StepRecord:
     reader = make_reader(BytesIO(data), validate_crcs=True)
     described = next(json.loads(m.metadata["json"]) for m in reader.iter_metadata())
-    messages = [
-        (channel.metadata["channel"], message.log_time, message.data)
-        for _, channel, message in reader.iter_messages(log_time_order=False)
-    ]
+    grouped: dict[str, list[tuple[int, bytes]]] = {}
+    for _, source, message in reader.iter_messages(log_time_order=False):
+        grouped.setdefault(source.metadata["channel"], []).append((message.log_time, message.data))
     clock_offset_ns = int(described.get("clock_offset_ns", clock_offset_ns))
     step = Step(**described["step"])
-    return StepRecord(step, _readings(messages, clock_offset_ns), float(described["seconds"]))
-
-
-def _readings(messages: Iterable[tuple[str, int, bytes]], clock_offset_ns: int) -> dict[str, Reading]:
-    grouped: dict[str, list[tuple[int, bytes]]] = {}
-    for channel_text, log_time, data in messages:
-        grouped.setdefault(channel_text, []).append((log_time, data))
-    readings = (_reading(_channel(text), samples, clock_offset_ns) for text, samples in grouped.items())
-    return {reading.channel.name: reading for reading in readings}
-
-
-def _channel(text: str) -> Channel:
-    fields = json.loads(text)
-    return Channel(**{**fields, "shape": tuple(fields["shape"])})
-
-
-def _reading(channel: Channel, samples: list[tuple[int, bytes]], clock_offset_ns: int) -> Reading:
-    codec = codec_of(channel)
-    decoded: list[tuple[AnyArray, bytes]] = [codec.decode(data, channel) for _, data in samples]
-    times = np.array([(wall_ns - clock_offset_ns) / 1e9 for wall_ns, _ in samples])
-    encoded = tuple(data for _, data in decoded) if decoded[0][1] else ()
-    return Reading(channel, times, np.array([value for value, _ in decoded]), encoded)
+    readings: dict[str, Reading] = {}
+    for text, samples in grouped.items():
+        fields = json.loads(text)
+        channel = Channel(**{**fields, "shape": tuple(fields["shape"])})
+        codec = codec_of(channel)
+        decoded: list[tuple[AnyArray, bytes]] = [codec.decode(data, channel) for _, data in samples]
+        times = np.array([(wall_ns - clock_offset_ns) / 1e9 for wall_ns, _ in samples])
+        encoded = tuple(data for _, data in decoded) if decoded[0][1] else ()
+        readings[channel.name] = Reading(channel, times, np.array([value for value, _ in decoded]), encoded)
+    return StepRecord(step, readings, float(described["seconds"]))
 
 
 _JSON_SCHEMA = {

@@ -9,7 +9,7 @@ import numpy as np
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.report import wording
 from harness.report.agreement_part import agreement_part
-from harness.report.data import AnswerRow, ContactRow, ErrorCurve, PeakLine, ReportData
+from harness.report.data import AnswerRow, ContactRow, ErrorCurve, ReportData
 from harness.report.figures.charts import error_chart
 from harness.report.figures.figures import Album, Picture
 from harness.report.figures.pictures import (
@@ -127,9 +127,12 @@ def _sound(data: ReportData, album: Album, sides: Sides | None) -> dict[str, Any
         else np.asarray(-posed[:3, 2])
     )
     near = close_up(data.mesh, _towards(data), to_the_tool, across, _SIDE_PIXELS)
+    counted = [] if isinstance(sound.peaks, Missing) else [abs(peak.counted) for peak in sound.peaks]
+    longest = max(counted, default=0.0)
     believed = {wording.SENSES[sense.name]: sense.posterior for sense in sound.senses}
     return {
-        "bars": _bars(sound.peaks),
+        # Each in per cent of the longest.
+        "bars": [100.0 * one / longest if longest > 0.0 else 0.0 for one in counted],
         "across": across,
         "senses": album.photograph("senses", senses_figure((*sides.shots, near), believed, truth)),
         "spectrograms": pair
@@ -139,15 +142,6 @@ def _sound(data: ReportData, album: Album, sides: Sides | None) -> dict[str, Any
             spectrogram_pair(pair.times, pair.frequencies, pair.recorded, pair.simulated),
         ),
     }
-
-
-def _bars(peaks: tuple[PeakLine, ...] | Missing) -> list[float]:
-    """Per cent of the longest bar that each peak's gets."""
-    if isinstance(peaks, Missing):
-        return []
-    counted = [abs(peak.counted) for peak in peaks]
-    longest = max(counted, default=0.0)
-    return [100.0 * one / longest if longest > 0.0 else 0.0 for one in counted]
 
 
 def _towards(data: ReportData) -> FloatArray:

@@ -1,6 +1,5 @@
 """Numbers as an operator reads them, and captions in words."""
 
-from harness.basics.arrays import FloatArray
 from harness.report.data import AnswerRow, PeakLine, ReportData, SenseAnswer, Sound
 from harness.report.values import Missing
 
@@ -39,18 +38,13 @@ def rate(hertz: float | None) -> str:
     return f"{hertz:.4g} Hz" if hertz < 1e4 else f"{hertz / 1e3:.5g} kHz"
 
 
-def place(position: FloatArray) -> str:
-    """A point in millimetres."""
-    x, y, z = position * 1e3
-    return f"({x:.1f}, {y:.1f}, {z:.1f}) mm"
-
-
 def headline(data: ReportData) -> str:
     """The answer in one sentence."""
     answer = data.answer
     if isinstance(answer, Missing):
         return f"No answer: {answer.reason}."
-    said = [f"The last contact lies at {place(answer.position)} on the {data.object_name}"]
+    x, y, z = answer.position * 1e3
+    said = [f"The last contact lies at ({x:.1f}, {y:.1f}, {z:.1f}) mm on the {data.object_name}"]
     if answer.error is not None:
         said.append(f"{millimetres(answer.error)} from the truth")
     if answer.credible90 is not None:
@@ -58,13 +52,10 @@ def headline(data: ReportData) -> str:
     sentence = ", ".join(said) + "."
     if answer.modes > 1:
         sentence += f" The readings fit {answer.modes} separate places; this is the likeliest."
-    return sentence if isinstance(data.sound, Missing) else f"{sentence} {by_sense(data.sound)}"
-
-
-def by_sense(sound: Sound) -> str:
-    """How near each sense came, in one sentence."""
-    said = ", ".join(f"by {SENSES[sense.name]} {_nearness(sense)}" for sense in sound.senses)
-    return f"{said[:1].upper()}{said[1:]}."
+    if isinstance(data.sound, Missing):
+        return sentence
+    senses = ", ".join(f"by {SENSES[sense.name]} {_nearness(sense)}" for sense in data.sound.senses)
+    return f"{sentence} {senses[:1].upper()}{senses[1:]}."
 
 
 def _nearness(sense: SenseAnswer) -> str:

@@ -159,6 +159,11 @@ def frequency_response(
     cross = np.sum(response * force.conj(), axis=0)
     h1 = _ratio(cross, drive)
     coherence = np.real(_ratio(np.abs(cross) ** 2, drive * answer)) if len(blows) > 1 else None
+    scatter = None
+    if coherence is not None:
+        # Bendat and Piersol, Random Data, 4th edition, section 9.2, with one degree of freedom fewer.
+        share = np.maximum(coherence, 1e-300)
+        scatter = np.abs(h1) * np.sqrt(np.maximum(1.0 - share, 0.0) / (2.0 * share * (len(blows) - 1)))
     strength = np.abs(force)
     floor = strength.max(axis=1, keepdims=True) * 10.0 ** (-FORCE_FLOOR / 20.0)
     return FrequencyResponse(
@@ -166,7 +171,7 @@ def frequency_response(
         read_only(h1),
         read_only(_ratio(answer, cross.conj())),
         None if coherence is None else read_only(coherence),
-        None if coherence is None else read_only(_scatter(h1, coherence, len(blows))),
+        None if scatter is None else read_only(scatter),
         read_only((strength >= floor).all(axis=0)),
         decay,
         blows,
@@ -311,12 +316,6 @@ def _ratio(above: AnyArray, below: AnyArray) -> ComplexArray:
     return np.asarray(np.where(there, above / np.where(there, below, 1.0), 0.0), np.complex128)
 
 
-def _scatter(h1: ComplexArray, coherence: FloatArray, count: int) -> FloatArray:
-    """Bendat and Piersol, Random Data, 4th edition, section 9.2, with ``count - 1`` degrees of freedom."""
-    share = np.maximum(coherence, 1e-300)
-    return np.asarray(np.abs(h1) * np.sqrt(np.maximum(1.0 - share, 0.0) / (2.0 * share * (count - 1))))
-
-
 def measure_blow(force: AnyArray, rate: float, level: float = 0.1) -> Blow:
     """A blow from its samples.
 
@@ -346,19 +345,26 @@ def measure_blow(force: AnyArray, rate: float, level: float = 0.1) -> Blow:
                 else "strike harder, or trigger on the right channel"
             )
         )
-    first, last = _reach(risen, noise)
+    second_hit = float(max(SECOND_HIT * risen.max(), _ABOVE_NOISE * noise))
+    touching = np.flatnonzero(risen > second_hit)
+    first, last = int(touching[0]), int(touching[-1])
     if first == 0 or last == len(risen) - 1:
         raise DataRefused(
             "the blow is cut off by an end of the record; record some milliseconds more about it"
         )
     around = round(_SETTLED * rate)
     begin, end = max(0, first - around), min(len(risen), last + around + 1)
-    fine = _interpolated(risen, begin, end)
+    within = risen[begin:end]
+    # ``_FINE`` points a sample; mirrored, so that the ends meet.
+    mirrored = np.concatenate([within, within[::-1]])
+    fine: FloatArray = resample(mirrored, len(mirrored) * _FINE)[: (len(within) - 1) * _FINE + 1]
     peak = float(fine.max())
     touch, touch_slopes = _above(fine, level * peak)
     half, _ = _above(fine, 0.5 * peak)
-    span, within = end - begin, risen[begin:end]
-    start = (begin + touch[0] / _FINE) / rate
+    span, start = end - begin, (begin + touch[0] / _FINE) / rate
+    # A touch: the force rises to the level of a second hit, having fallen to half of it before.
+    state = np.where(risen >= second_hit, 1, np.where(risen < 0.5 * second_hit, -1, 0))
+    held = state[state != 0]
     return Blow(
         peak=peak,
         peak_sigma=float(np.hypot(noise, line.sigma)),
@@ -372,7 +378,7 @@ def measure_blow(force: AnyArray, rate: float, level: float = 0.1) -> Blow:
         / (_FINE * rate),
         width=(half[1] - half[0]) / (_FINE * rate),
         start=start,
-        touches=_touches(risen, noise),
+        touches=int(np.count_nonzero(np.diff(held) > 0) + (held[0] > 0)),
         rest=float(line.at(np.array(start))),
         drift=line.slope,
         noise=noise,
@@ -406,7 +412,13 @@ def _above_rest(samples: FloatArray, rate: float) -> tuple[RestLine, FloatArray]
         top = int(np.argmax(risen))
         spread = 1.4826 * float(np.median(np.abs(risen - np.median(risen))))
         loud = np.abs(risen) > max(_LOUD * risen[top], _ABOVE_NOISE * spread)
-        begin, end = _event(loud, top, around)
+        begin = end = top
+        if loud[top]:
+            # The loud samples about the top that no quiet stretch separates from it.
+            places = np.flatnonzero(loud)
+            groups = np.split(places, np.flatnonzero(np.diff(places) > 2 * around) + 1)
+            group = next(group for group in groups if group[0] <= top <= group[-1])
+            begin, end = int(group[0]), int(group[-1])
         quiet = np.ones(len(samples), np.bool_)
         for place in np.flatnonzero(loud):
             quiet[max(0, place - around) : place + around + 1] = False
@@ -423,42 +435,6 @@ def _above_rest(samples: FloatArray, rate: float) -> tuple[RestLine, FloatArray]
             "the force is at rest nowhere near the blow; record some milliseconds more about the blow"
         )
     return line, samples - rest
-
-
-def _event(loud: BoolArray, top: int, around: int) -> tuple[int, int]:
-    """Return first and last loud sample about ``top`` that no quiet stretch parts from it."""
-    places = np.flatnonzero(loud)
-    if not loud[top]:
-        return top, top
-    groups = np.split(places, np.flatnonzero(np.diff(places) > 2 * around) + 1)
-    group = next(group for group in groups if group[0] <= top <= group[-1])
-    return int(group[0]), int(group[-1])
-
-
-def _reach(risen: FloatArray, noise: float) -> tuple[int, int]:
-    """First and last sample at the level of a second touch."""
-    touching = np.flatnonzero(risen > _hit_level(risen, noise))
-    return int(touching[0]), int(touching[-1])
-
-
-def _hit_level(risen: FloatArray, noise: float) -> float:
-    return float(max(SECOND_HIT * risen.max(), _ABOVE_NOISE * noise))
-
-
-def _touches(risen: FloatArray, noise: float) -> int:
-    """How often the force rises to the level, having fallen to half of it before."""
-    level = _hit_level(risen, noise)
-    state = np.where(risen >= level, 1, np.where(risen < 0.5 * level, -1, 0))
-    held = state[state != 0]
-    return int(np.count_nonzero(np.diff(held) > 0) + (held[0] > 0))
-
-
-def _interpolated(risen: FloatArray, begin: int, end: int) -> FloatArray:
-    """From ``begin`` on, ``_FINE`` points a sample; mirrored, so that the ends meet."""
-    piece = risen[begin:end]
-    both = np.concatenate([piece, piece[::-1]])
-    fine: FloatArray = resample(both, len(both) * _FINE)
-    return fine[: (len(piece) - 1) * _FINE + 1]
 
 
 def _above(fine: FloatArray, level: float) -> tuple[tuple[float, float], FloatArray]:

@@ -431,7 +431,11 @@ def _merge_rows(
         return None
     if len(members) < len(rows) and unexplained < _EXPLAINED * left:
         return None
-    second = _are_resolved(fit, members) and _has_second_mode(values, alone.residual, shared, search.misfit)
+    # Two peaks in one row need neighbouring poles that are far enough apart.
+    order = members[np.argsort(fit.omegas[members])]
+    widths = np.abs(fit.decays[order])
+    are_resolved = bool(np.any(np.diff(fit.omegas[order]) > _RESOLVED * np.maximum(widths[1:], widths[:-1])))
+    second = are_resolved and _has_second_mode(values, alone.residual, shared, search.misfit)
     if second or _repeats(alone.omegas):
         return None
     return _average(members, reach, alone.omegas, alone.decays, powers)
@@ -463,13 +467,6 @@ def _has_second_mode(
     limit = np.maximum(misfit * power, _PEAK_FRACTION * misfit * power.max(axis=1, keepdims=True))
     noise = np.maximum(explained, np.mean(explained, axis=1, keepdims=True))
     return bool(np.any(left > np.maximum(limit, _NOISE_PEAK * noise)))
-
-
-def _are_resolved(fit: PoleFit, members: IntArray) -> bool:
-    """Return whether neighbouring poles of a group are far enough apart for two peaks in one row."""
-    order = members[np.argsort(fit.omegas[members])]
-    widths = np.abs(fit.decays[order])
-    return bool(np.any(np.diff(fit.omegas[order]) > _RESOLVED * np.maximum(widths[1:], widths[:-1])))
 
 
 def _repeats(omegas: FloatArray) -> bool:

@@ -292,7 +292,12 @@ def _spread_out(
     reach: list[tuple[float, float]] = []
     known, widths = fit.omegas / (2.0 * np.pi), fit.decays / (2.0 * np.pi)
     for top in tops:
-        frequency, half = float(lines.frequencies[top]), _half_width(lines, power, int(top))
+        frequency = float(lines.frequencies[top])
+        # Hz from the peak to where it has half its power, on its steeper side.
+        below = power < 0.5 * power[top]
+        sides = np.flatnonzero(below[top:]), np.flatnonzero(below[top::-1])
+        steeper = min([int(side[0]) for side in sides if len(side)], default=1)
+        half = max(0.5, steeper - 0.5) * lines.step
         beside = np.abs(known - frequency) < 2.0 * APART * widths
         broad = max(half, 2.0 * float(widths[beside].max(initial=0.0)))
         if all(abs(frequency - other) > APART * max(broad, breadth) for other, breadth in reach):
@@ -300,12 +305,3 @@ def _spread_out(
             # A hump at the lowest lines is a mode near critical damping, as fast as it is broad.
             chosen.append((2.0 * np.pi * max(frequency, half), 2.0 * np.pi * half))
     return chosen
-
-
-def _half_width(lines: SpectralLines, power: FloatArray, top: int) -> float:
-    """Hz from a peak to where it has half its power, on its steeper side."""
-    below = power < 0.5 * power[top]
-    up = np.flatnonzero(below[top:])
-    down = np.flatnonzero(below[top::-1])
-    reach = min([int(side[0]) for side in (up, down) if len(side)], default=1)
-    return max(0.5, reach - 0.5) * lines.step

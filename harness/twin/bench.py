@@ -109,10 +109,16 @@ class TwinBench:
         self.sensor = sensor
         self.solid = Solid(mesh)
         self.clearance = clearance
-        self.joint_range = _common_range(arm_table(model).joint_range, joint_range)
+        self.joint_range = arm_table(model).joint_range
+        if joint_range is not None:
+            low, high = self.joint_range
+            low, high = np.maximum(low, joint_range[0]), np.minimum(high, joint_range[1])
+            self.joint_range = read_only(np.stack([low, high]))
         self._object_in_base = apply(self.base_from_object, self.solid.hull)
         self.object_top = float(self._object_in_base[:, 2].max())
-        self.pad = _pad(sensor, depth=HOUSING_LENGTH)
+        # The space before and behind the gel's surface that the object may dent, in the gel's frame.
+        half = _half_pad(sensor)
+        self.pad = ConvexBody.box(np.array([*-half, -HOUSING_LENGTH]), np.array([*half, HOUSING_LENGTH]))
         tool = [*_tool(sensor, self.flange_from_gel)]
         if flange_from_hammer is not None:
             tool.append(striker(np.asarray(flange_from_hammer, dtype=np.float64)))
@@ -256,18 +262,6 @@ class TwinBench:
             pos=[*middle, 0.5 * (low + table_height)],
             rgba=_FOAM,
         )
-
-
-def _common_range(makers: FloatArray, station: FloatArray | None) -> FloatArray:
-    if station is None:
-        return makers
-    return read_only(np.stack([np.maximum(makers[0], station[0]), np.minimum(makers[1], station[1])]))
-
-
-def _pad(sensor: TactileSensor, depth: float) -> ConvexBody:
-    """The space before and behind the gel's surface that the object may dent, in the gel's frame."""
-    half = _half_pad(sensor)
-    return ConvexBody.box(np.array([*-half, -depth]), np.array([*half, depth]))
 
 
 def _half_pad(sensor: TactileSensor) -> FloatArray:

@@ -39,7 +39,14 @@ def connect(
     way = _shortest(bench, stations)
     if way is None and thorough and not bench.hits(start) and not bench.hits(end):
         way = search(bench, start, end, np.random.default_rng(seed))
-    return None if way is None else _divided(way)[1:]
+    if way is None:
+        return None
+    # Divide motions in which a joint turns more than ``LONGEST_MOVE``.
+    pieces = [way[:1]]
+    for a, b in itertools.pairwise(way):
+        count = max(1, math.ceil(float(np.abs(b - a).max()) / LONGEST_MOVE))
+        pieces.append(a + np.linspace(0.0, 1.0, count + 1)[1:, None] * (b - a))
+    return np.concatenate(pieces)[1:]
 
 
 def lifted(bench: TwinBench, joints: FloatArray, back: float, headroom: float | None) -> FloatArray | None:
@@ -174,12 +181,3 @@ def _shortened(bench: TwinBench, way: FloatArray, rng: np.random.Generator) -> F
         if b - a > 1 and sweep(bench, way[a], way[b]) is None:
             way = np.concatenate([way[: a + 1], way[b:]])
     return way
-
-
-def _divided(way: FloatArray) -> FloatArray:
-    """The same way with no motion in which a joint turns more than ``LONGEST_MOVE``."""
-    pieces = [way[:1]]
-    for a, b in itertools.pairwise(way):
-        count = max(1, math.ceil(float(np.abs(b - a).max()) / LONGEST_MOVE))
-        pieces.append(a + np.linspace(0.0, 1.0, count + 1)[1:, None] * (b - a))
-    return np.concatenate(pieces)

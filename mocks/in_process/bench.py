@@ -119,7 +119,13 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
         elif sample == LOOK:
             truth.looked()
 
-    hammer = None if strikes is None else _hammer(strikes, arm, station, stage)
+    hammer = None
+    if strikes is not None:
+        from mocks.in_process.hammer import InProcessHammer  # by runs that are to be heard, and by no others
+
+        assert station.hammer is not None
+        assert station.arm.striker_output is not None  # nobody strikes by hand at a mocked bench
+        hammer = InProcessHammer(strikes, arm, station.arm.striker_output, stage, station.hammer)
     microphone = None
     if strikes is not None and hammer is not None and station.own_microphone is not None:
         microphone = _microphone(strikes, hammer, station, stage)
@@ -140,14 +146,6 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
         microphone=microphone,
         simulated_clock=lambda: stage.time,
     )
-
-
-def _hammer(strikes: "StrikeCounts", arm: InProcessArm, station: Station, stage: Stage) -> "InProcessHammer":
-    from mocks.in_process.hammer import InProcessHammer  # by runs that are to be heard, and by no others
-
-    assert station.hammer is not None
-    assert station.arm.striker_output is not None  # nobody strikes by hand at a mocked bench
-    return InProcessHammer(strikes, arm, station.arm.striker_output, stage, station.hammer)
 
 
 def _microphone(

@@ -65,7 +65,13 @@ def perturbed(nominal: Tetrahedra, wall_change: float) -> Tetrahedra:
     surface = nominal.surface
     outer = np.unique(surface.faces)
     normals = surface.vertex_normals[outer]
-    wall = _smoothed(surface, outer, wall_thickness(surface, surface.vertices[outer], normals))
+    # The wall at the surface's nodes, without what is only a rim's height.
+    wall = wall_thickness(surface, surface.vertices[outer], normals)
+    wall = np.minimum(wall, _THICKEST * float(np.median(wall)))
+    joined = _graph(surface.faces, len(surface.vertices))[outer][:, outer]
+    neighbours = joined.sum(axis=1)
+    for _ in range(_ROUNDS):
+        wall = 0.5 * wall + 0.5 * (joined @ wall) / neighbours
     way = _extended(nominal, outer, 0.5 * wall_change * wall[:, None] * normals)
     made = tetrahedra(nominal.nodes + _eased(nominal, way), nominal.cells)
     if not np.array_equal(made.cells, nominal.cells):
@@ -110,16 +116,6 @@ def uneven(
     stiffer, heavier = (np.exp(smooth_field(middles, sigma, length, random)) for _ in range(2))
     poisson = np.full(len(middles), material.poisson + poisson_change)
     return Elasticity(material.young * stiffer, poisson, material.density * heavier)
-
-
-def _smoothed(surface: Mesh, outer: IntArray, wall: FloatArray) -> FloatArray:
-    """``(n,)`` m: the wall at the surface's nodes, without what is only a rim's height."""
-    held = np.minimum(wall, _THICKEST * float(np.median(wall)))
-    joined = _graph(surface.faces, len(surface.vertices))[outer][:, outer]
-    neighbours = joined.sum(axis=1)
-    for _ in range(_ROUNDS):
-        held = 0.5 * held + 0.5 * (joined @ held) / neighbours
-    return held
 
 
 def _extended(nominal: Tetrahedra, outer: IntArray, way: FloatArray) -> FloatArray:

@@ -324,10 +324,15 @@ class WorldSound:
 
     def _middling_level(self, gap: Gap) -> float:
         """Pa rms of the median over the surface of strikes along the normal, without cross terms of modes."""
-        modes, pulse = self._modes, gap.sound.pulse
+        modes = self._modes
         chosen = np.linspace(0, len(modes.points) - 1, min(_PLACES, len(modes.points))).astype(np.int64)
         gains = np.einsum("kmd,kd->km", modes.shapes[chosen], modes.normals[chosen])
-        first = np.abs(gains * self._levels) * self._draw.nominal_impulse * _spectrum(self.frequencies, pulse)
+        # Share of a half sine's impulse at each frequency; at f = 1 / (2 pulse) it tends to pi / 4.
+        turns = self.frequencies * gap.sound.pulse
+        apart = 1.0 - 4.0 * turns**2
+        near = np.abs(apart) < 1e-6
+        spectrum = np.where(near, np.pi / 4, np.abs(np.cos(np.pi * turns) / np.where(near, 1.0, apart)))
+        first = np.abs(gains * self._levels) * self._draw.nominal_impulse * spectrum
         below = self.frequencies < 0.5 * self._rate
         decays = 2.0 * self.dampings[below] * MIDDLING_OVER
         powers = 0.5 * first[:, below] ** 2 @ (-np.expm1(-decays) / decays)
@@ -351,12 +356,3 @@ def _half_sine(times: FloatArray, length: float, impulse: float) -> FloatArray:
     inside = (times > 0.0) & (times < length)
     peak = impulse * np.pi / (2.0 * length)
     return np.where(inside, peak * np.sin(np.pi * np.where(inside, times, 0.0) / length), 0.0)
-
-
-def _spectrum(frequencies: FloatArray, length: float) -> FloatArray:
-    """Share of a half sine's impulse at each frequency."""
-    turns = frequencies * length
-    apart = 1.0 - 4.0 * turns**2
-    near = np.abs(apart) < 1e-6  # at f = 1 / (2 length) both go to zero: pi / 4
-    share: FloatArray = np.where(near, np.pi / 4, np.abs(np.cos(np.pi * turns) / np.where(near, 1.0, apart)))
-    return share

@@ -122,7 +122,8 @@ class MoveJoints:
         self._time += seconds
         share = self._profile.share(self._time)
         self.done = share == 1.0
-        body.put_joints(self._goal if self.done else _mixed(self._start, self._goal, share))
+        pairs = zip(self._start, self._goal, strict=True)
+        body.put_joints(self._goal if self.done else as_six([a + share * (b - a) for a, b in pairs]))
 
     def replan(self) -> None:
         """From where the arm is."""
@@ -213,10 +214,6 @@ def as_six(numbers: Sequence[float]) -> Six:
     """Six numbers."""
     a, b, c, d, e, f = numbers
     return a, b, c, d, e, f
-
-
-def _mixed(start: Six, goal: Six, share: float) -> Six:
-    return as_six([a + share * (b - a) for a, b in zip(start, goal, strict=True)])
 
 
 def _approached(present: Sequence[float], target: Sequence[float], step: float) -> tuple[list[float], bool]:

@@ -124,17 +124,13 @@ def _position(target: list[Any], index: Any) -> int:
 def _arithmetic(apply: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     def checked(a: Any, b: Any) -> Any:
         if type(a) is str and type(b) is str and apply is operator.add:
-            return _joined(a, b)
+            if len(a) + len(b) > LONGEST_STRING:
+                raise ScriptError(f"a string of {len(a) + len(b)} letters; {LONGEST_STRING} is the limit")
+            return a + b
         result = apply(number(a), number(b))
         return result if type(result) is not int or -INT32 <= result < INT32 else float(result)
 
     return checked
-
-
-def _joined(a: str, b: str) -> str:
-    if len(a) + len(b) > LONGEST_STRING:
-        raise ScriptError(f"a string of {len(a) + len(b)} letters; {LONGEST_STRING} is the limit")
-    return a + b
 
 
 def _divide(a: Any, b: Any) -> float:
