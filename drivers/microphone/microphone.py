@@ -335,7 +335,15 @@ def acquire() -> Any:
     with _lock:
         library = _load()
         if _users == 0:
-            _list_again(library)
+            try:
+                # sounddevice documents no other way to see new devices.
+                library._terminate()  # noqa: SLF001
+                library._initialize()  # noqa: SLF001
+            except library.PortAudioError as error:
+                reason = str(error.args[0]) if error.args else type(error).__name__
+                raise BenchFault(
+                    f"PortAudio did not start: {reason}; check the system's sound settings"
+                ) from error
         _users += 1
         return library
 
@@ -362,16 +370,6 @@ def _load() -> Any:
     return sounddevice
 
 
-def _list_again(library: Any) -> None:
-    """Start PortAudio anew; sounddevice documents no other way to see new devices."""
-    try:
-        library._terminate()  # noqa: SLF001
-        library._initialize()  # noqa: SLF001
-    except library.PortAudioError as error:
-        reason = str(error.args[0]) if error.args else type(error).__name__
-        raise BenchFault(f"PortAudio did not start: {reason}; check the system's sound settings") from error
-
-
 def find_input(library: Any, device: str, channels: int) -> dict[str, Any]:
     """The one input device of that name, which must have just so many channels.
 
@@ -388,19 +386,16 @@ def find_input(library: Any, device: str, channels: int) -> dict[str, Any]:
     chosen = [each for name, each in full.items() if device in (name, each["name"])]
     chosen = chosen or [each for name, each in full.items() if device and device in name]
     if len(chosen) == 1:
-        return _with_channels(chosen[0], channels)
+        found = chosen[0]
+        if found["max_input_channels"] != channels:
+            raise BenchFault(
+                f"microphone: {found['name']!r} has {found['max_input_channels']} input channels and the "
+                f"station says {channels}; another number would be mixed without a word: set the station's "
+                "channels to the device's"
+            )
+        return found
     there = "; ".join(repr(name) for name in full) or "none at all"
     problem = "is no sound input here" if not chosen else f"fits {len(chosen)} sound inputs"
     raise BenchFault(
         f"microphone: {device!r} {problem}; plug it in or name one of these in the station: {there}"
     )
-
-
-def _with_channels(found: dict[str, Any], channels: int) -> dict[str, Any]:
-    if found["max_input_channels"] != channels:
-        raise BenchFault(
-            f"microphone: {found['name']!r} has {found['max_input_channels']} input channels and the station "
-            f"says {channels}; another number would be mixed without a word: set the station's channels to "
-            "the device's"
-        )
-    return found

@@ -58,7 +58,14 @@ class UrSession:
         self._process: ChildProcess | None = None
         try:
             for port, name in PORTS.items():
-                _require_port(address, port, name)
+                try:
+                    socket.create_connection((address, port), timeout=2.0).close()
+                except OSError as error:
+                    raise BenchFault(
+                        f"no arm controller at {address}: its {name} port {port} does not answer ({error}); "
+                        "check the network cable of the control box, that the box is on, and the address in "
+                        "the station file"
+                    ) from error
             require_mock(address, dashboard.ask(address, "get serial number"))
             self._process = ChildProcess(command, rate, keep=(self._lock,))
             self.controller: list[str] = self._ready(self._process)
@@ -207,16 +214,6 @@ class UrSession:
         process.kill()
         with contextlib.suppress(BenchFault):
             dashboard.stop(self.address)
-
-
-def _require_port(address: str, port: int, name: str) -> None:
-    try:
-        socket.create_connection((address, port), timeout=2.0).close()
-    except OSError as error:
-        raise BenchFault(
-            f"no arm controller at {address}: its {name} port {port} does not answer ({error}); check the "
-            "network cable of the control box, that the box is on, and the address in the station file"
-        ) from error
 
 
 _PREFIX, _SUFFIX = "touchstone-arm-", ".lock"

@@ -309,15 +309,12 @@ def _packet(payload: bytes, time: float) -> FloatArray:
     packet[_COLUMNS] = _SAMPLE.unpack(payload)[1:]
     packet[pipe.FIELDS["time"]] = time
     if not np.isfinite(packet).all():
-        raise BenchFault(_not_finite(packet))
+        name, ours = next(
+            (name, ours) for name, _, ours in _FIELDS if not np.isfinite(packet[pipe.FIELDS[ours]]).all()
+        )
+        raise BenchFault(
+            f"the controller sent the {name} {packet[pipe.FIELDS[ours]].tolist()}, where numbers must be "
+            "finite: nothing guards the arm without them; look at the pendant's log, and restart the "
+            "controller"
+        )
     return packet
-
-
-def _not_finite(packet: FloatArray) -> str:
-    name, ours = next(
-        (name, ours) for name, _, ours in _FIELDS if not np.isfinite(packet[pipe.FIELDS[ours]]).all()
-    )
-    return (
-        f"the controller sent the {name} {packet[pipe.FIELDS[ours]].tolist()}, where numbers must be finite: "
-        "nothing guards the arm without them; look at the pendant's log, and restart the controller"
-    )

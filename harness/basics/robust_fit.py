@@ -65,8 +65,14 @@ def robust_fit(
         start = _weighted(design, wanted, 1.0 / np.maximum(left, 0.1 * floor))
     # The scale is that of the start and stays: it would else creep up with every outlier that is let in.
     scale = max(scatter(wanted - design @ start), floor)
-    values = _settled(design, wanted, start, scale)
-    if values is None:
+    values = start
+    for _ in range(_ROUNDS):
+        u = (wanted - design @ values) / (TUKEY * scale)
+        weights = np.where(np.abs(u) < 1.0, (1.0 - u**2) ** 2, 0.0)
+        before, values = values, _weighted(design, wanted, weights)
+        if np.abs(values - before).max() <= _SETTLED:
+            break
+    else:
         return None
     u = (wanted - design @ values) / (TUKEY * scale)
     inside = np.abs(u) < 1.0
@@ -78,17 +84,6 @@ def robust_fit(
     pulls = np.column_stack([np.bincount(blocks, column, count) for column in pull.T])
     moved: FloatArray = np.asarray(np.linalg.solve(bread, pulls.T).T, np.float64)
     return RobustFit(values, moved, scale, float(np.mean(~inside)))
-
-
-def _settled(design: FloatArray, wanted: FloatArray, values: FloatArray, scale: float) -> FloatArray | None:
-    """Values that no further round changes."""
-    for _ in range(_ROUNDS):
-        u = (wanted - design @ values) / (TUKEY * scale)
-        weights = np.where(np.abs(u) < 1.0, (1.0 - u**2) ** 2, 0.0)
-        before, values = values, _weighted(design, wanted, weights)
-        if np.abs(values - before).max() <= _SETTLED:
-            return values
-    return None
 
 
 def _weighted(design: FloatArray, wanted: FloatArray, weights: FloatArray) -> FloatArray:

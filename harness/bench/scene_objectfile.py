@@ -110,16 +110,14 @@ def with_objectfile(tree: Any, folder: Path, where: str) -> Any:
                 f"{where}: 'object.{key}' is of a mesh, and the ObjectFile {path} says its own; leave it out"
             )
     require_objectfile(path, f"{where}: 'object.objectfile'")
-    name, material = _described(path / DESCRIPTION)
-    return {**tree, "object": {**named, "mesh": OBJECTFILE + name, "material": material}}
-
-
-def _described(path: Path) -> tuple[str, str]:
-    """Name and material; whoever opens the folder reads all of it, and strictly."""
+    # Only name and material: the program that opens the folder reads all of it, and strictly.
+    description = path / DESCRIPTION
     try:
-        tree = json.loads(path.read_text(encoding="utf-8"))
-        return str(tree["name"]), str(tree["material"]["name"])
+        described = json.loads(description.read_text(encoding="utf-8"))
+        name, material = str(described["name"]), str(described["material"]["name"])
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise DataRefused(
-            f"{path} does not say the object's name and material; copy it again, or build the object again"
+            f"{description} does not say the object's name and material; copy it again, or build the object "
+            "again"
         ) from error
+    return {**tree, "object": {**named, "mesh": OBJECTFILE + name, "material": material}}

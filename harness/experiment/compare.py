@@ -31,7 +31,7 @@ from harness.sim.optics.lit_calibration import shadow_of
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
 CARRIED = ("object.mesh", "object.wall", "object.material", "sensor", "sensor.calibration", "seed")
-"""Sources that every run's folder carries; a camera's are ``scene_picture.camera_gives``."""
+"""Sources that every run's folder carries; ``require_sources`` adds a camera's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,13 +72,24 @@ def require_sources(
     """
     levels = default_accuracy(EFFECTS).with_(scene_levels(scene))
     plan = scene_plan(scene, station.gel.sensor, levels)
-    given = {*CARRIED, *experiment.gives, *camera_gives(scene, station)}
+    given = {*CARRIED, *experiment.gives}
+    if station.camera is not None and scene.sensors.camera:
+        given |= {"camera", "camera.lights"}
+        # Rays need the object's colours, which a run knows of a built-in object alone.
+        if scene.object.builtin is not None:
+            given.add("object.appearance")
     if shadow_of(calibration) is not None:
         given.add("sensor.shadow_table")
     if scene.object.objectfile is not None:
         given.add("object.file")
     if "camera.lights" in plan.sources:
-        require_white_lamps(scene)
+        for number, lamp in enumerate(scene.lights, start=1):
+            if max(lamp.colour) - min(lamp.colour) > _GREY * max(lamp.colour):
+                raise WrongUse(
+                    f"lamp {number} of the scene has the colour {list(lamp.colour)}, and a run's picture is "
+                    "simulated under white lamps; give its red, green and blue one number, or leave "
+                    "camera.image out of observe"
+                )
     missing = [name for name in plan.sources if name not in given]
     if missing:
         raise WrongUse(
@@ -166,34 +177,8 @@ _GREY = 1e-6
 """Relative, by which the parts of a lamp's colour may differ and still be one number."""
 
 
-def camera_gives(scene: SceneFile, station: Station) -> tuple[str, ...]:
-    """Sources of a picture that a run of this scene has; none without a scene camera.
-
-    Rays need the object's colours, which a run knows of a built-in object alone.
-    """
-    if station.camera is None or not scene.sensors.camera:
-        return ()
-    colours = () if scene.object.builtin is None else ("object.appearance",)
-    return ("camera", "camera.lights", *colours)
-
-
-def require_white_lamps(scene: SceneFile) -> None:
-    """Refuse a scene whose picture is to be simulated under a coloured lamp.
-
-    Raises:
-        WrongUse: naming the lamp and its colour.
-    """
-    for number, lamp in enumerate(scene.lights, start=1):
-        if max(lamp.colour) - min(lamp.colour) > _GREY * max(lamp.colour):
-            raise WrongUse(
-                f"lamp {number} of the scene has the colour {list(lamp.colour)}, and a run's picture is "
-                "simulated under white lamps; give its red, green and blue one number, or leave camera.image "
-                "out of observe"
-            )
-
-
 def camera_sources(scene: SceneFile, station: Station, mesh: Mesh, wanted: Sequence[str]) -> dict[str, Any]:
-    """Those of ``camera_gives`` that are wanted, in the object's frame at its nominal pose.
+    """The sources of a picture that are wanted, in the object's frame at its nominal pose.
 
     Args:
         scene: with a camera and white lamps.

@@ -295,7 +295,14 @@ def _channel(
         raise DataRefused(
             f"{name}: its pixels are mostly outliers to any gain and offset; check object, pose and light"
         )
-    _require_light(fit.values, group_variance(fit.moved, groups), name)
+    # A simulation's errors make a gain smaller, never one of nothing: they are no doubt that there is light.
+    error = float(np.sqrt(group_variance(fit.moved, groups)[0]))
+    if not fit.values[0] > _SURE * error:
+        raise DataRefused(
+            f"{name}: the live picture does not get brighter where the simulated one does (gain "
+            f"{fit.values[0]:.3g} +- {error:.2g}, to be {_SURE:g} of these above zero); check object, pose "
+            "and light, or fit the gain alone"
+        )
     values, moved = np.zeros(2), np.zeros((len(groups), 2))
     values[: fit.values.size], moved[:, : fit.values.size] = fit.values, fit.moved
     seen = where.copy()
@@ -336,15 +343,4 @@ def _require_told(light: FloatArray, kind: ExposureKind, name: str) -> None:
     if kind == "gain" and float(light.mean()) < _LEAST_SPREAD:
         raise DataRefused(
             f"{name}: the simulated object is black ({light.mean():.1g} of 1), so no gain can be told"
-        )
-
-
-def _require_light(values: FloatArray, variance: FloatArray, name: str) -> None:
-    # A simulation's errors make a gain smaller, never one of nothing: they are no doubt that there is light.
-    error = float(np.sqrt(variance[0]))
-    if not values[0] > _SURE * error:
-        raise DataRefused(
-            f"{name}: the live picture does not get brighter where the simulated one does (gain "
-            f"{values[0]:.3g} +- {error:.2g}, to be {_SURE:g} of these above zero); check object, pose and "
-            "light, or fit the gain alone"
         )

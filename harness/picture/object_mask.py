@@ -76,7 +76,13 @@ def mask_by_colours(live: ByteArray, silhouette: BoolArray) -> BoolArray:
             f"the object covers {'none' if not silhouette.any() else 'all'} of the simulated picture; check "
             "the camera's pose, it must show the object and some of what is behind it"
         )
-    near = _around(silhouette)
+    spans = []
+    for axis in (1, 0):
+        places = np.flatnonzero(silhouette.any(axis=axis))
+        first, last = int(places[0]), int(places[-1]) + 1
+        margin = int(np.ceil(_MARGIN * (last - first))) + _SMALL
+        spans.append(slice(max(0, first - margin), min(silhouette.shape[1 - axis], last + margin)))
+    near = spans[0], spans[1]
     cut = np.where(silhouette[near], cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
     if not (cut == cv2.GC_PR_BGD).any():
         raise DataRefused(
@@ -96,16 +102,6 @@ def overlap(one: BoolArray, other: BoolArray) -> float:
     """Pixels in both masks over those in either (IoU); 1 where both are empty."""
     either = int((one | other).sum())
     return float((one & other).sum()) / either if either else 1.0
-
-
-def _around(silhouette: BoolArray) -> tuple[slice, slice]:
-    found = []
-    for axis in (1, 0):
-        places = np.flatnonzero(silhouette.any(axis=axis))
-        first, last = int(places[0]), int(places[-1]) + 1
-        margin = int(np.ceil(_MARGIN * (last - first))) + _SMALL
-        found.append(slice(max(0, first - margin), min(silhouette.shape[1 - axis], last + margin)))
-    return found[0], found[1]
 
 
 def _meeting(mask: BoolArray, silhouette: BoolArray) -> BoolArray:

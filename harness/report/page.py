@@ -57,7 +57,15 @@ def write_report(data: ReportData, folder: Path) -> Path:
 
 def _content(data: ReportData, album: Album) -> dict[str, Any]:
     bench = data.bench
-    sides = object_sides(data.mesh, _towards(data), _SIDE_PIXELS) if _is_drawn(data) else None
+    # The object is shown if a contact was located or posed, or a sense has something to show.
+    shown = [
+        one
+        for contact in data.contacts
+        for one in (contact.posterior, contact.object_from_gel)
+        if not isinstance(one, Missing)
+    ]
+    is_shown = bool(shown) or not isinstance(data.sound, Missing)
+    sides = object_sides(data.mesh, _towards(data), _SIDE_PIXELS) if is_shown else None
     return {
         "data": data,
         "say": wording,
@@ -74,17 +82,6 @@ def _content(data: ReportData, album: Album) -> dict[str, Any]:
         "by_contact": _chart(data.error_by_contact, "error_by_contact", "contacts used", False, album),
         "by_seconds": _chart(data.error_by_seconds, "error_by_seconds", "seconds a contact", True, album),
     }
-
-
-def _is_drawn(data: ReportData) -> bool:
-    """Whether the object is: if a contact was located or posed, or a sense has something to show."""
-    shown = [
-        one
-        for contact in data.contacts
-        for one in (contact.posterior, contact.object_from_gel)
-        if not isinstance(one, Missing)
-    ]
-    return bool(shown) or not isinstance(data.sound, Missing)
 
 
 def _on_the_object(data: ReportData, album: Album, sides: Sides | None) -> dict[str, Any]:

@@ -175,7 +175,13 @@ class MjpegServer:
         with contextlib.suppress(OSError), client:
             client.settimeout(_REQUEST_TIMEOUT)
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            request = _request_line(client)
+            received = b""
+            while b"\r\n\r\n" not in received and len(received) < 8192:
+                more = client.recv(4096)
+                if not more:
+                    break
+                received += more
+            request = received.split(b"\r\n", 1)[0].decode("ascii", "replace")
             if "action=stream" in request:
                 self._stream(client)
             elif "action=snapshot" in request:
@@ -200,13 +206,3 @@ class MjpegServer:
             while self._number <= last and not self._stopped:
                 self._changed.wait(1.0)
             return self._frame, self._number
-
-
-def _request_line(client: socket.socket) -> str:
-    received = b""
-    while b"\r\n\r\n" not in received and len(received) < 8192:
-        more = client.recv(4096)
-        if not more:
-            break
-        received += more
-    return received.split(b"\r\n", 1)[0].decode("ascii", "replace")

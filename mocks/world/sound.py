@@ -272,7 +272,10 @@ class WorldSound:
         times = np.arange(round((blow.throw + LISTEN) * self._rate)) / self._rate
         force, pressure = np.zeros(len(times)), np.zeros(len(times))
         if aim.met is not None:
-            force = _force(times, blow)
+            force = _half_sine(times - blow.throw, blow.pulse, blow.impulse)
+            if blow.bounce is not None:
+                later = times - blow.throw - blow.bounce
+                force = force + _half_sine(later, blow.pulse, blow.bounce_share * blow.impulse)
             pressure = self._heard(force, aim.met, aim.direction_in_object, step, sample)
         ambient = self.noise * self._draw.noise(len(times), 1, step, sample)[:, 0]
         heard = read_only(pressure + ambient)
@@ -340,16 +343,6 @@ class WorldSound:
         if self._room is not None:
             room += 10.0 ** (-gap.sound.direct_to_reverberant / 10.0)
         return float(np.sqrt(room * np.median(powers)))
-
-
-def _force(times: FloatArray, blow: BlowDraw) -> FloatArray:
-    """``(t,)`` N: a half sine, and perhaps a second, smaller one."""
-    force = _half_sine(times - blow.throw, blow.pulse, blow.impulse)
-    if blow.bounce is not None:
-        force = force + _half_sine(
-            times - blow.throw - blow.bounce, blow.pulse, blow.bounce_share * blow.impulse
-        )
-    return force
 
 
 def _half_sine(times: FloatArray, length: float, impulse: float) -> FloatArray:

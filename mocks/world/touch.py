@@ -140,7 +140,16 @@ class GelContact:
 
     def __init__(self, mesh: Mesh, window: tuple[float, float], spacing: float, reach: float) -> None:
         self._corners = mesh.corners
-        self._starts, self._members, self._origin, self._shape = _sorted_into_boxes(mesh)
+        # Faces by the boxes of edge ``CELL`` that their bounds touch, as starts and members.
+        self._origin = mesh.bounds[0] - CELL / 2
+        self._shape = np.ceil((mesh.bounds[1] + CELL / 2 - self._origin) / CELL).astype(np.int64)
+        if int(np.prod(self._shape)) > _LARGEST_GRID:
+            raise ValueError(
+                f"an object of {mesh.diagonal:.2f} m is larger than any that the gel could touch"
+            )
+        low = np.floor((mesh.corners.min(axis=1) - self._origin) / CELL).astype(np.int64)
+        high = np.floor((mesh.corners.max(axis=1) - self._origin) / CELL).astype(np.int64)
+        self._starts, self._members = _fill(low, high, self._shape)
         self._counts = (round(window[0] / spacing), round(window[1] / spacing))
         self._pitch = (window[0] / self._counts[0], window[1] / self._counts[1])
         self._reach = reach
@@ -189,18 +198,6 @@ class GelContact:
         low = np.floor((centre - half - self._origin) / CELL).astype(np.int64)
         high = np.floor((centre + half - self._origin) / CELL).astype(np.int64)
         return np.maximum(low, 0), np.minimum(high, self._shape - 1)
-
-
-def _sorted_into_boxes(mesh: Mesh) -> tuple[IntArray, IntArray, FloatArray, IntArray]:
-    """Faces by the boxes of edge ``CELL`` that their bounds touch, as starts and members."""
-    origin = mesh.bounds[0] - CELL / 2
-    shape = np.ceil((mesh.bounds[1] + CELL / 2 - origin) / CELL).astype(np.int64)
-    if int(np.prod(shape)) > _LARGEST_GRID:
-        raise ValueError(f"an object of {mesh.diagonal:.2f} m is larger than any that the gel could touch")
-    low = np.floor((mesh.corners.min(axis=1) - origin) / CELL).astype(np.int64)
-    high = np.floor((mesh.corners.max(axis=1) - origin) / CELL).astype(np.int64)
-    starts, members = _fill(low, high, shape)
-    return starts, members, origin, shape
 
 
 @numba.njit(cache=True, nogil=True)

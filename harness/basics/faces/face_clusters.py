@@ -48,7 +48,16 @@ def cluster_faces(mesh: Mesh) -> FaceClusters:
         MeshRefused: no face, or a corner that is not finite.
     """
     corners = corners_to_raster(mesh)
-    order = np.argsort(_curve(corners.mean(axis=1)), kind="stable")
+    # Places along Morton's curve: the bits of x, y and z in turn.
+    points = corners.mean(axis=1)
+    start = points.min(axis=0)
+    extent = max(float((points.max(axis=0) - start).max()), 1e-30)
+    cells = np.minimum((points - start) / extent * 2**_STEPS, 2**_STEPS - 1).astype(np.int64)
+    place = np.zeros(len(points), np.int64)
+    for bit in range(_STEPS):
+        for axis in range(3):
+            place |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+    order = np.argsort(place, kind="stable")
     count = -(-len(order) // CLUSTER)
     spread = np.full((count * CLUSTER, 9), np.nan)
     spread[: len(order)] = corners[order].reshape(-1, 9)
@@ -65,18 +74,6 @@ def cluster_faces(mesh: Mesh) -> FaceClusters:
         _boxes(low, high),
         _boxes(group_low, group_high),
     )
-
-
-def _curve(points: FloatArray) -> IntArray:
-    """``(n,)`` places along Morton's curve: the bits of x, y and z in turn."""
-    low = points.min(axis=0)
-    extent = max(float((points.max(axis=0) - low).max()), 1e-30)
-    cells = np.minimum((points - low) / extent * 2**_STEPS, 2**_STEPS - 1).astype(np.int64)
-    place = np.zeros(len(points), np.int64)
-    for bit in range(_STEPS):
-        for axis in range(3):
-            place |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
-    return place
 
 
 def _boxes(low: FloatArray, high: FloatArray) -> FloatArray:

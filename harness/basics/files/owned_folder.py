@@ -45,15 +45,12 @@ def _remove_ownerless(prefix: str, parent: Path) -> None:
             lock = os.open(folder / _OWNER, os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC) if mine else None
         except OSError:  # it is not a held folder, or another program is removing it
             continue
-        if lock is not None:
-            _remove_if_free(folder, lock)
-
-
-def _remove_if_free(folder: Path, lock: int) -> None:
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        shutil.rmtree(folder, ignore_errors=True)
-    except BlockingIOError:  # its owner lives
-        return
-    finally:
-        os.close(lock)
+        if lock is None:
+            continue
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            shutil.rmtree(folder, ignore_errors=True)
+        except BlockingIOError:  # its owner lives
+            continue
+        finally:
+            os.close(lock)
