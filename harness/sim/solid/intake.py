@@ -14,9 +14,8 @@ from harness.sim.solid.mesh_read import METRES, RawMesh, read_mesh
 from harness.sim.solid.mesh_repair import (
     RepairedSurface,
     boundary_edges,
-    drop_collapsed,
     drop_duplicates,
-    drop_flat,
+    drop_faces,
     drop_specks,
     fill_holes,
     is_watertight,
@@ -29,6 +28,7 @@ from harness.sim.solid.mesh_repair import (
 _ASKED_ABOUT = ("m", "cm", "mm")
 _SMALLEST, _LARGEST = 5e-3, 2.0
 _SOLID_FILL, _SOLID_VOLUME = 0.6, 1e-4
+_FLAT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,8 @@ def take_in(
     fill_holes(surface)
     pieces = join_bodies(surface)
     watertight = is_watertight(surface.faces)
-    drop_flat(surface)
+    # Corners on one line: the slit that such a face leaves has no width.
+    drop_faces(surface, surface.areas() > _FLAT * surface.size**2, "faces without area")
     mesh = Mesh(surface.vertices, surface.faces)
     sides = mesh.bounds[1] - mesh.bounds[0]
     thinnest = float(sides.min())
@@ -208,7 +209,8 @@ def _cleaned(raw: RawMesh, name: str) -> RepairedSurface:
     if surface.size == 0.0:
         raise MeshRefused(f"{name}: all {len(surface.faces)} faces lie in one point; export it again")
     weld(surface)
-    drop_collapsed(surface)
+    a, b, c = surface.faces.T
+    drop_faces(surface, (a != b) & (b != c) & (c != a), "collapsed faces")
     drop_duplicates(surface)
     area = float(surface.areas().sum())
     if len(surface.faces) < 4 or not area > 1e-13 * surface.size**2:

@@ -172,7 +172,13 @@ def choose_up_axis(requested: str | None, declared: str | None) -> tuple[str, st
 
 def _with_meshio(path: Path) -> RawMesh:
     mesh = read_cells(path)
-    faces = [_triangles_of(block.type, block.data) for block in mesh.cells]
+    # Surface cells of any order, by their corner nodes.
+    faces = []
+    for block in mesh.cells:
+        if block.type.startswith("triangle"):
+            faces.append(block.data[:, :3])
+        elif block.type.startswith("quad"):
+            faces += [block.data[:, [0, 1, 2]], block.data[:, [0, 2, 3]]]
     kinds = {block.type for block in mesh.cells if block.type.startswith(SOLIDS)}
     notes: tuple[str, ...] = ()
     if kinds:
@@ -208,12 +214,3 @@ def read_cells(path: Path) -> CellFile:
     cells = tuple(CellBlock(block.type, np.asarray(block.data, np.int64)) for block in found.cells)
     single = np.asarray(found.points).dtype == np.float32
     return CellFile(np.asarray(found.points, np.float64), cells, found.point_sets, (), single)
-
-
-def _triangles_of(kind: str, cells: IntArray) -> IntArray:
-    """Faces of surface cells of any order, by their corner nodes; none of other cells."""
-    if kind.startswith("triangle"):
-        return cells[:, :3]
-    if kind.startswith("quad"):
-        return np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
-    return np.zeros((0, 3), np.int64)

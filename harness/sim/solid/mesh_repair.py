@@ -17,7 +17,6 @@ from harness.basics.faces.mesh_rays import is_inside, openness
 
 _WELD = 2e-6
 _SPECK_SIZE, _SPECK_AREA = 0.03, 0.002
-_FLAT = 1e-12
 _MOST_PATCHES = 256
 _FEW = 0.05
 _LARGEST_HOLE = 0.08
@@ -71,16 +70,12 @@ def weld(surface: RepairedSurface) -> None:
         surface.repairs.append(f"welded {before} vertices into {len(first)}")
 
 
-def drop_collapsed(surface: RepairedSurface) -> None:
-    """Drop faces that name a vertex twice."""
-    f = surface.faces
-    sound = (f[:, 0] != f[:, 1]) & (f[:, 1] != f[:, 2]) & (f[:, 2] != f[:, 0])
-    _drop(surface, sound, "collapsed faces")
-
-
-def drop_flat(surface: RepairedSurface) -> None:
-    """Drop faces whose corners lie on one line; the slit they leave has no width."""
-    _drop(surface, surface.areas() > _FLAT * surface.size**2, "faces without area")
+def drop_faces(surface: RepairedSurface, sound: BoolArray, what: str) -> None:
+    """Keep the sound faces only; ``what`` names the others in the list of repairs."""
+    dropped = int(np.count_nonzero(~sound))
+    if dropped:
+        surface.keep(sound)
+        surface.repairs.append(f"dropped {dropped} {what}")
 
 
 def drop_duplicates(surface: RepairedSurface) -> None:
@@ -106,7 +101,7 @@ def drop_duplicates(surface: RepairedSurface) -> None:
     without[first[flap]] = False
     if flap.sum() < _FEW * len(groups) or (without.any() and _is_closed(surface.faces[without])):
         once = without
-    _drop(surface, once, "duplicate faces")
+    drop_faces(surface, once, "duplicate faces")
 
 
 def drop_specks(surface: RepairedSurface) -> None:
@@ -171,13 +166,6 @@ def is_watertight(faces: IntArray) -> bool:
     directed = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     once = len(np.unique(directed, axis=0)) == len(directed)
     return once and len(boundary_edges(faces)) == 0
-
-
-def _drop(surface: RepairedSurface, sound: BoolArray, what: str) -> None:
-    dropped = int(np.count_nonzero(~sound))
-    if dropped:
-        surface.keep(sound)
-        surface.repairs.append(f"dropped {dropped} {what}")
 
 
 def _graph(pairs: IntArray, size: int) -> coo_array:

@@ -101,7 +101,12 @@ def sample_surface(mesh: Mesh, spacing: float, seed: int = 0) -> Surface:
     points = np.ascontiguousarray(dense[chosen])
     # Points come in no order, so the first of them are as even as all of them.
     enough = slice(0, max(2000, int(_DENSITY_FOR_NORMALS * float(mesh.face_areas.sum()))))
-    normals = _smoothed(dense[enough], facing[enough], points, np.ascontiguousarray(facing[chosen]))
+    first, width = dense[enough], _SMOOTHING_RADIUS
+    cells, shape = _cells(first, width)
+    order = np.argsort(cells, kind="stable")
+    starts = np.searchsorted(cells[order], np.arange(int(np.prod(shape)) + 1))
+    own, lowest = np.ascontiguousarray(facing[chosen]), first.min(axis=0)
+    normals = _mean_normals(first, facing[enough], points, own, order, starts, lowest, shape, width)
     owner = cKDTree(points).query(dense)[1]
     owned = np.bincount(owner, minlength=len(points)).astype(np.float64)
     nearest = np.asarray(cKDTree(points).query(points, k=NEIGHBOURS + 1)[1])[:, 1:]
@@ -128,15 +133,6 @@ def voxel_table(points: FloatArray, pitch: float, reach: float) -> VoxelTable:
     nearest = np.full(tuple(shape), -1, dtype=np.int32)
     _paint(points, origin, pitch, reach, nearest)
     return VoxelTable(read_only(origin), pitch, read_only(nearest), reach)
-
-
-def _smoothed(dense: FloatArray, facing: FloatArray, points: FloatArray, normals: FloatArray) -> FloatArray:
-    radius = _SMOOTHING_RADIUS
-    cells, shape = _cells(dense, radius)
-    order = np.argsort(cells, kind="stable")
-    starts = np.searchsorted(cells[order], np.arange(int(np.prod(shape)) + 1))
-    lowest = dense.min(axis=0)
-    return _mean_normals(dense, facing, points, normals, order, starts, lowest, shape, radius)
 
 
 def _cells(points: FloatArray, size: float) -> tuple[IntArray, IntArray]:

@@ -140,7 +140,14 @@ def tetrahedralize(
             f"an element edge of {edge * 1e3:g} mm is outside 0 to {mesh.diagonal * 1e3:.4g} mm, the "
             "diagonal of the object; say one in between"
         )
-    _require_few_cells(mesh, edge)
+    # Regular tetrahedra of this edge are fewer than the real ones.
+    count = abs(signed_volume(mesh)) * 6.0 * np.sqrt(2.0) / edge**3
+    if count > _MAX_CELLS:
+        shortest = 1.01 * edge * np.cbrt(count / _MAX_CELLS)
+        raise WrongUse(
+            f"an element edge of {edge * 1e3:g} mm needs about {count:.2g} elements; at most {_MAX_CELLS:,} "
+            f"are made: give an edge of at least {shortest * 1e3:.3g} mm"
+        )
     wall = thin_wall(mesh)
     if envelope is None:
         envelope = min(ENVELOPE_OF_WALL * wall, _ENVELOPE_OF_EDGE * edge, _ENVELOPE_OF_SIZE * mesh.diagonal)
@@ -208,21 +215,6 @@ def _simplified(mesh: Mesh, tolerance: float) -> Mesh:
         return mesh
     fewer = from_manifold(solid.simplify(tolerance / _MM))
     return Mesh(fewer.vertices * _MM + mesh.vertices[0], fewer.faces)
-
-
-def _require_few_cells(mesh: Mesh, edge: float) -> None:
-    """Refuse an edge that fills the mesh with more cells than memory and time allow.
-
-    Raises:
-        WrongUse: regular tetrahedra of this edge, which are fewer than the real ones, exceed the limit.
-    """
-    count = abs(signed_volume(mesh)) * 6.0 * np.sqrt(2.0) / edge**3
-    if count > _MAX_CELLS:
-        shortest = 1.01 * edge * np.cbrt(count / _MAX_CELLS)
-        raise WrongUse(
-            f"an element edge of {edge * 1e3:g} mm needs about {count:.2g} elements; at most {_MAX_CELLS:,} "
-            f"are made: give an edge of at least {shortest * 1e3:.3g} mm"
-        )
 
 
 def signed_volumes(nodes: FloatArray, cells: IntArray) -> FloatArray:
