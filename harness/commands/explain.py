@@ -15,6 +15,7 @@ def explain(
         typer.Argument(
             help="A scene file, of which examples are under scenes/, or the folder of an ObjectFile.",
             metavar="SCENE",
+            callback=options.check_scene_or_object,
         ),
     ],
     station: options.Station = "mock",
