@@ -45,5 +45,5 @@ def build(name: str, edge: float = 3e-3) -> "Mesh":
     from harness.objects import household, targets
 
     if name in TARGETS:
-        return targets.build_target(name, edge)
+        return targets.BUILDERS[name](edge)
     return household.build(name, edge)

@@ -5,7 +5,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
 from harness.objects.solid import lathe, outward
 
@@ -45,15 +44,5 @@ def ball(edge: float = 3e-3) -> Mesh:
     return outward(lathe(np.vstack([foot, arc]), fine, np.mod(7.318281828 * fine / BALL_RADIUS, 1.0)))
 
 
-_BUILDERS: MappingProxyType[str, Callable[[float], Mesh]] = MappingProxyType({"ball": ball})
-
-
-def build_target(name: str, edge: float = 3e-3) -> Mesh:
-    """A target in metres.
-
-    Raises:
-        WrongUse: no such target.
-    """
-    if name not in _BUILDERS:
-        raise WrongUse(f"no built-in target {name!r}; there are {', '.join(_BUILDERS)}")
-    return _BUILDERS[name](edge)
+BUILDERS: MappingProxyType[str, Callable[[float], Mesh]] = MappingProxyType({"ball": ball})
+"""By the names of ``harness.objects.builtin.TARGETS``."""
