@@ -1,5 +1,6 @@
 """Numbers as an operator reads them, and captions in words."""
 
+from harness.basics.arrays import FloatArray
 from harness.report.data import AnswerRow, PeakLine, ReportData, SenseAnswer, Sound
 from harness.report.values import Missing
 
@@ -38,13 +39,18 @@ def rate(hertz: float | None) -> str:
     return f"{hertz:.4g} Hz" if hertz < 1e4 else f"{hertz / 1e3:.5g} kHz"
 
 
+def place(position: FloatArray) -> str:
+    """A point in millimetres."""
+    x, y, z = position * 1e3
+    return f"({x:.1f}, {y:.1f}, {z:.1f}) mm"
+
+
 def headline(data: ReportData) -> str:
     """The answer in one sentence."""
     answer = data.answer
     if isinstance(answer, Missing):
         return f"No answer: {answer.reason}."
-    x, y, z = answer.position * 1e3
-    said = [f"The last contact lies at ({x:.1f}, {y:.1f}, {z:.1f}) mm on the {data.object_name}"]
+    said = [f"The last contact lies at {place(answer.position)} on the {data.object_name}"]
     if answer.error is not None:
         said.append(f"{millimetres(answer.error)} from the truth")
     if answer.credible90 is not None:
