@@ -8,7 +8,7 @@ import numpy as np
 from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
 from experiments.scale_estimation.contact_planning import placed
 from experiments.scale_estimation.touch.touch import Touch
-from experiments.scale_estimation.unseen.spectrogram import FRAMES, band_levels, response_of
+from experiments.scale_estimation.unseen.spectrogram import FRAMES, bands_of, levels_of, response_of
 from experiments.scale_estimation.vision.vision import Sight
 from harness.basics.errors import FitRefused
 from harness.basics.materials import MATERIALS
@@ -115,7 +115,9 @@ def _spectrum(answering: ScaleAnswering, album: Album) -> PageSection:
     if heard is None:
         return PageSection("By sound", "No strike may be used.", None)
     material = MATERIALS[answering.run.scene.object.material]
-    frequencies, levels = band_levels(*heard, material)
+    responses, rate, band = heard
+    middles, inside = bands_of(band, material)
+    levels = levels_of(responses, rate, inside, material)[0][:, inside]
     named = {
         f"{1e3 * a:.0f} to {1e3 * b:.0f} ms": level for (a, b), level in zip(FRAMES, levels, strict=True)
     }
@@ -123,7 +125,9 @@ def _spectrum(answering: ScaleAnswering, album: Album) -> PageSection:
         "How loudly bands ring, early and late. The size is told from it and from the material, by what "
         "household things of all sizes sound like."
     )
-    return PageSection("By sound", words, album.drawing("spectrum", spectrogram_figure(frequencies, named)))
+    return PageSection(
+        "By sound", words, album.drawing("spectrum", spectrogram_figure(middles[inside], named))
+    )
 
 
 def _touched(answering: ScaleAnswering, found: SizeAnswer, album: Album) -> PageSection:

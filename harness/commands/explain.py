@@ -9,13 +9,24 @@ from harness.commands import options
 from harness.commands.output import ANSWERS, emit
 
 
+def _check(path: Path) -> Path:
+    """Refuse what is neither a scene nor an ObjectFile."""
+    from harness.bench.scene_objectfile import holds_objectfile, objectfile_folder
+
+    return (
+        path
+        if holds_objectfile(objectfile_folder(str(path), Path.cwd()))
+        else options.check_scene(path) or path
+    )
+
+
 def explain(
     scene: Annotated[
         Path,
         typer.Argument(
             help="A scene file, of which examples are under scenes/, or the folder of an ObjectFile.",
             metavar="SCENE",
-            callback=options.check_scene_or_object,
+            callback=_check,
         ),
     ],
     station: options.Station = "mock",

@@ -14,7 +14,6 @@ from harness.basics.errors import WrongUse
 from harness.bench.experiments import require_experiment
 from harness.bench.named_files import named_file, require_run
 from harness.bench.scene_objectfile import (
-    holds_objectfile,
     objectfile_folder,
     require_object,
     require_objectfile,
@@ -36,11 +35,6 @@ def check_scene(path: Path | None) -> Path | None:
     if path is not None:
         named_file(str(path), "scene")
     return path
-
-
-def check_scene_or_object(path: Path) -> Path:
-    """Refuse what is neither a scene nor an ObjectFile."""
-    return path if holds_objectfile(objectfile_folder(str(path), Path.cwd())) else check_scene(path) or path
 
 
 def _named(parameter: typer.CallbackParam) -> str:

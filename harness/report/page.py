@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 
-from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.arrays import AnyArray, ByteArray, FloatArray
 from harness.report import wording
 from harness.report.agreement_part import agreement_part
 from harness.report.data import AnswerRow, ContactRow, ErrorCurve, ReportData
@@ -22,7 +23,7 @@ from harness.report.figures.pictures import (
     posterior_strip,
 )
 from harness.report.figures.sound import senses_figure, spectrogram_pair
-from harness.report.figures.tiles import DIFFERENCE_GAIN, difference, height_picture, png
+from harness.report.figures.tiles import DIFFERENCE_GAIN, difference, png
 from harness.report.template import write_page
 from harness.report.values import Missing, Posterior
 
@@ -198,3 +199,10 @@ def _chart(
     if not any(curve.x for curve in curves):
         return Missing("no errors were given")
     return album.drawing(name, error_chart(curves, x_label, logarithmic_x))
+
+
+def height_picture(height: FloatArray, highest: float) -> ByteArray:
+    """``(rows, columns, 3)`` of indentation in metres, dark at 0 and bright at ``highest``."""
+    level = np.clip(height / highest, 0.0, 1.0) if highest > 0.0 else np.zeros_like(height)
+    colours = mpl.colormaps["viridis"](level)[..., :3]
+    return np.asarray(np.round(255.0 * colours), dtype=np.uint8)

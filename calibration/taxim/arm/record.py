@@ -14,7 +14,7 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from calibration.taxim.arm.moves import ArmScale, arm_scale
 from calibration.taxim.arm.settled import look
-from calibration.taxim.arm.touch_down import middles_at_depth, touch_downs
+from calibration.taxim.arm.touch_down import touch_downs
 from calibration.taxim.pictures import Pictures, PressPack, Refused, set_digest
 from calibration.taxim.smooth_fit import distance
 from harness.basics.arrays import ByteArray, FloatArray, block_means, read_only
@@ -104,7 +104,8 @@ class ArmPresses:
         ball = self.ball_radius / self.pitch
         descents = [one.descent for one in self.taken]
         on_gel = np.array([one.on_gel for one in self.taken])
-        found = arm_scale(touch_downs(descents, ball), on_gel, middles_at_depth(descents, ball))
+        began, at_depth = touch_downs(descents, ball)
+        found = arm_scale(began, on_gel, at_depth)
         share = found.pitch.value / self.pitch
         if not 1.0 / LEAST_BALL < share < LEAST_BALL:
             raise CalibrationRefused(

@@ -59,7 +59,7 @@ PICTURES = max(way.pictures for way in WAYS)
 """Of the way down that are worth taking."""
 
 
-def touch_downs(descents: list[FloatArray], ball: float) -> tuple[FloatArray, ...]:
+def touch_downs(descents: list[FloatArray], ball: float) -> tuple[tuple[FloatArray, ...], FloatArray]:
     """Where each press began, once for every one of ``WAYS``.
 
     Args:
@@ -68,25 +68,13 @@ def touch_downs(descents: list[FloatArray], ball: float) -> tuple[FloatArray, ..
         ball: radius in pixels.
 
     Returns:
-        ``(presses, 2)`` pixels (column, row) a way; NaN where a press shows nothing.
+        ``(presses, 2)`` pixels (column, row) a way; and where the middles are before they are carried back:
+        in the deepest picture, by the first of ``WAYS``. NaN where a press shows nothing.
     """
     seen = [_contact(change, ball) for change in descents]
-    return tuple(np.array([_began(one, way) for one in seen]).reshape(-1, 2) for way in WAYS)
-
-
-def middles_at_depth(descents: list[FloatArray], ball: float) -> FloatArray:
-    """Where the middles are before they are carried back: in the deepest picture, by the first of ``WAYS``.
-
-    Args:
-        descents: as for ``touch_downs``.
-        ball: radius in pixels.
-
-    Returns:
-        ``(presses, 2)`` pixels (column, row), NaN where nothing was seen.
-    """
-    seen = [_contact(change, ball) for change in descents]
+    began = tuple(np.array([_began(one, way) for one in seen]).reshape(-1, 2) for way in WAYS)
     deepest = [_middle(_weight(one[-1], WAYS[0])) if len(one) else np.full(2, np.nan) for one in seen]
-    return np.array(deepest).reshape(-1, 2)
+    return began, np.array(deepest).reshape(-1, 2)
 
 
 def _contact(change: FloatArray, ball: float) -> FloatArray:

@@ -23,7 +23,7 @@ from experiments.contact_localization.posterior.noise import (
 from experiments.contact_localization.touch.touch import Contact, TouchMap, best_fit, touch_terms
 from harness.basics.arrays import FloatArray, IntArray
 from harness.bench.bench_errors import USUAL
-from harness.sim.gel.view import ToolView, half_as_fine, view_along
+from harness.sim.gel.view import ToolView, view_along, view_of
 from harness.sim.solid.surface_samples import Surface
 
 _YAWS_TO = 5
@@ -99,7 +99,8 @@ class Search:
         sensor = self.model.sensor
         if coarse and self.prior.yaw == "known":
             # The fine picture will be asked for as well.
-            return half_as_fine(self.view(contact, picture), sensor)
+            fine = self.view(contact, picture)
+            return view_of(fine.depth[::2, ::2], fine.object_from_view, fine.origin, 2.0 * fine.pitch, sensor)
         nominal = np.radians(_YAW_STEP * picture)
         object_from_base = self.prior.object_from_base(np.array([nominal]))[0]
         object_from_gel = object_from_base @ self.contacts[contact].base_from_gel[:3, :3]

@@ -27,8 +27,16 @@ from harness.effects.accuracy import Accuracy, Setting
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
 from harness.recording.run_folder import RunFiles
-from harness.report.data import AnswerRow, BenchScene, ContactRow, ErrorCurve, ReportData, TwinDeviation
-from harness.report.figures.pictures import arm_parts, object_part, sensor_parts, table_and_pedestal
+from harness.report.data import (
+    AnswerRow,
+    BenchPart,
+    BenchScene,
+    ContactRow,
+    ErrorCurve,
+    ReportData,
+    TwinDeviation,
+)
+from harness.report.figures.pictures import CLAY, arm_parts, sensor_parts, table_and_pedestal
 from harness.report.page import write_report
 from harness.report.run_page import NO_TRUTH, facts_of
 from harness.report.values import Missing
@@ -190,7 +198,7 @@ def _bench(run: RunFiles, found: Found) -> BenchScene:
     corners = run.mesh.bounds
     in_base = base_from_object[:3, :3] @ corners.T + base_from_object[:3, 3:]
     parts = (
-        object_part(run.mesh, base_from_object),
+        BenchPart(run.mesh, base_from_object, CLAY),
         *table_and_pedestal(
             base_from_object, float(in_base[2].min()), 0.5 * scene.support.width, scene.table.height
         ),

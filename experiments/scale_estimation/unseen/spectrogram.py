@@ -58,29 +58,20 @@ def features(
         band: Hz, that was excited.
         material: that the object is said to be of.
     """
-    _, inside = _bands(band, material)
-    level, loudest = _levels(responses, rate, inside, material)
+    _, inside = bands_of(band, material)
+    level, loudest = levels_of(responses, rate, inside, material)
     bands = np.vstack([np.where(inside, 1.0 + level / FLOOR, 0.0), inside[None].astype(np.float64)])
     one_hot = np.array([name == material.name for name in MATERIALS], dtype=np.float64)
     return bands, np.concatenate([[0.3 * np.log10(loudest), 0.3 * len(responses)], one_hot])
 
 
-def band_levels(
-    responses: FloatArray, rate: float, band: tuple[float, float], material: Material
-) -> tuple[FloatArray, FloatArray]:
-    """``(b,)`` Hz and ``(FRAMES, b)`` dB below the loudest, of the bands that were excited, for a picture."""
-    middles, inside = _bands(band, material)
-    level, _ = _levels(responses, rate, inside, material)
-    return middles[inside], level[:, inside]
-
-
-def _bands(band: tuple[float, float], material: Material) -> tuple[FloatArray, BoolArray]:
+def bands_of(band: tuple[float, float], material: Material) -> tuple[FloatArray, BoolArray]:
     """``(BANDS,)`` Hz, the middles; which of them were excited."""
     middles = np.sqrt(_EDGES[1:] * _EDGES[:-1]) * material.speed
     return middles, (middles >= band[0]) & (middles <= band[1])
 
 
-def _levels(
+def levels_of(
     responses: FloatArray, rate: float, inside: BoolArray, material: Material
 ) -> tuple[FloatArray, float]:
     """``(FRAMES, BANDS)`` dB below the loudest, and its power."""

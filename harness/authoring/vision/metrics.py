@@ -5,10 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from harness.authoring.vision.data import HeldOutViews
-from harness.objectfile.vision.render import RenderSettings, VisionRenderer
 from harness.picture.image_metrics import psnr, ssim
 from harness.picture.linear_image import LinearImage
-from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.direct_image import LitObject
 
 BEHIND = 1.0
@@ -23,24 +21,10 @@ def reference_pictures(lit: LitObject, held_out: HeldOutViews, samples: int) -> 
         held_out: one picture for each camera and its light.
         samples: a side of a pixel.
     """
-    return [lit.render(camera, [light], samples).image for camera, light in _kept(held_out)]
-
-
-def network_pictures(
-    renderer: VisionRenderer, held_out: HeldOutViews, settings: RenderSettings | None = None
-) -> list[LinearImage]:
-    """The same from networks.
-
-    Args:
-        renderer: of them.
-        held_out: one picture for each camera and its light.
-        settings: of the renderer; None for the default.
-    """
-    return [renderer.render(camera, light, settings).image for camera, light in _kept(held_out)]
-
-
-def _kept(held_out: HeldOutViews) -> "zip[tuple[Pinhole, DirectionalLight]]":
-    return zip(held_out.cameras, held_out.lights, strict=True)
+    return [
+        lit.render(camera, [light], samples).image
+        for camera, light in zip(held_out.cameras, held_out.lights, strict=True)
+    ]
 
 
 def picture_errors(references: Sequence[LinearImage], found: Sequence[LinearImage]) -> Mapping[str, float]:

@@ -12,7 +12,7 @@ from harness.authoring.training import Laps, Report
 from harness.authoring.vision.cells import CellTraining
 from harness.authoring.vision.data import HeldOutViews, held_out_pictures
 from harness.authoring.vision.lessons import OPAQUE, draw_for
-from harness.authoring.vision.metrics import network_pictures, picture_errors, reference_pictures
+from harness.authoring.vision.metrics import picture_errors, reference_pictures
 from harness.authoring.vision.profiles import CellsSpec, VisionProfile
 from harness.authoring.vision.surface_cells import surface_cells
 from harness.objectfile.vision.graph import vision_graph
@@ -68,7 +68,9 @@ def author_vision(
     model = training.finish()
     report("measuring", 0.0)
     data = vision_graph(model).SerializeToString()
-    found = network_pictures(VisionRenderer(data, look.mesh, threads), held_out)
+    renderer = VisionRenderer(data, look.mesh, threads)
+    views = zip(held_out.cameras, held_out.lights, strict=True)
+    found = [renderer.render(camera, light).image for camera, light in views]
     clock.lap("measure")
     errors = {**picture_errors(references, found), "bytes": float(len(data))}
     # No teacher: every description says so, and the same build goes on writing the same file.

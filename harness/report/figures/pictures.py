@@ -283,11 +283,6 @@ def cylinder(radius: float, low: float, high: float) -> Mesh:
     return closed_hull(np.vstack([ring + low * _Z, ring + high * _Z]))
 
 
-def object_part(mesh: Mesh, base_from_object: FloatArray) -> BenchPart:
-    """The object, in the colour of clay."""
-    return BenchPart(mesh, base_from_object, CLAY)
-
-
 def table_and_pedestal(
     base_from_object: FloatArray, bottom: float, radius: float = 0.03, table: float = 0.0
 ) -> tuple[BenchPart, BenchPart]:

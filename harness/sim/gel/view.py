@@ -71,15 +71,10 @@ def view_along(
     view_from_object = transform(object_from_gel.T, np.array([-centre[0], -centre[1], 0.0]))
     depth = surface(view_from_object, pitch, int(rows), int(columns))
     origin = centre - 0.5 * pitch * np.array([columns - 1.0, rows - 1.0])
-    return _view_of(depth, object_from_gel, origin, pitch, sensor)
+    return view_of(depth, object_from_gel, origin, pitch, sensor)
 
 
-def half_as_fine(view: ToolView, sensor: TactileSensor) -> ToolView:
-    """Every second pixel each way of a view."""
-    return _view_of(view.depth[::2, ::2], view.object_from_view, view.origin, 2.0 * view.pitch, sensor)
-
-
-def _view_of(
+def view_of(
     depth: FloatArray, object_from_gel: FloatArray, origin: FloatArray, pitch: float, sensor: TactileSensor
 ) -> ToolView:
     # The rows first, by whole rows at a time: several times as fast as blocks.

@@ -15,13 +15,13 @@ from types import MappingProxyType
 
 import numpy as np
 
-from harness.basics.arrays import FloatArray, IntArray, read_only
+from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.basics.errors import OutOfDomain
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.picture.linear_image import LinearImage
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import Appearance
-from harness.sim.light.lambert import Places, irradiance, places_seen, radiance, sees_light
+from harness.sim.light.lambert import Places, cosines, places_seen, radiance
 
 MOST_SAMPLES = 64
 """A side of a pixel: four thousand places, and less error than a grey level of 12 bits."""
@@ -242,3 +242,28 @@ def _nearest(count: int, step: int) -> int:
         if times == 0:
             return size
         long = (long[0] - times * short[0], long[1] - times * short[1])
+
+
+def irradiance(places: Places, light: DirectionalLight, size: float) -> FloatArray:
+    """``(n,)`` what falls on each place where nothing is in the light's way.
+
+    Args:
+        places: of the surface.
+        light: from far away.
+        size: m, of the object.
+    """
+    return light.irradiance * cosines(places, light.direction[None], size)
+
+
+def sees_light(rays: RayMesh, places: Places, light: DirectionalLight, asked: BoolArray) -> BoolArray:
+    """Whether nothing is between each place and the light.
+
+    Args:
+        rays: of the same surface.
+        places: of the surface.
+        light: from far away.
+        asked: ``(n,)`` the places that it matters for; False is answered for the others.
+    """
+    free = np.zeros(len(places), np.bool_)
+    free[asked] = rays.free(places.lifted[asked], light.direction, places.faces[asked])
+    return free

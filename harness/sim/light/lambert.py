@@ -4,11 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
+from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.compiled import compiled
 from harness.basics.errors import OutOfDomain
-from harness.basics.faces.ray_mesh import RayMesh
-from harness.picture.pinhole import DirectionalLight
 from harness.sim.light.appearance import Appearance
 
 Three = tuple[float, float, float]
@@ -60,17 +58,6 @@ def places_seen(
     return Places(faces, points, normals, flat, lifted, appearance.albedo(faces, weights))
 
 
-def irradiance(places: Places, light: DirectionalLight, size: float) -> FloatArray:
-    """``(n,)`` what falls on each place where nothing is in the light's way.
-
-    Args:
-        places: of the surface.
-        light: from far away.
-        size: m, of the object.
-    """
-    return light.irradiance * cosines(places, light.direction[None], size)
-
-
 def cosines(places: Places, towards: FloatArray, size: float) -> FloatArray:
     """``(n,)`` cosine between each place and what it faces, 0 where it faces away; nothing is in the way.
 
@@ -80,20 +67,6 @@ def cosines(places: Places, towards: FloatArray, size: float) -> FloatArray:
         size: m, of the object.
     """
     return lit_by(towards, places.points, places.normals, places.flat, places.lifted, size)
-
-
-def sees_light(rays: RayMesh, places: Places, light: DirectionalLight, asked: BoolArray) -> BoolArray:
-    """Whether nothing is between each place and the light.
-
-    Args:
-        rays: of the same surface.
-        places: of the surface.
-        light: from far away.
-        asked: ``(n,)`` the places that it matters for; False is answered for the others.
-    """
-    free = np.zeros(len(places), np.bool_)
-    free[asked] = rays.free(places.lifted[asked], light.direction, places.faces[asked])
-    return free
 
 
 def radiance(places: Places, falling: FloatArray) -> FloatArray:

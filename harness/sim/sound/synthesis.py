@@ -18,7 +18,8 @@ from threadpoolctl import ThreadpoolController
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, read_only
 from harness.basics.errors import WrongUse
 from harness.sim.sound.modal_sound import audible, check_modes, check_rate, impulse_response, is_heavy
-from harness.sim.sound.synthesis_tables import Steps, fill_sound, longest_sum
+from harness.sim.sound.synthesis_kernels import TILE
+from harness.sim.sound.synthesis_tables import SPLITS, TOGETHER, Steps, fill_sound
 
 SynthesisLevel = Literal["fast", "double", "exact"]
 """``"fast"``: tables in single precision from phases in double, and a spectrum in double precision of modes
@@ -168,7 +169,7 @@ def _rounding(amplitudes: AnyArray, peaks: FloatArray, samples: int, level: Synt
     """``(k,)``: what roundings add up to.
 
     Those of the tables and of the sum are a random walk along two terms a mode of each group and then
-    along the groups (``synthesis_tables.longest_sum``), its partial sums as large as independent
+    along the groups, its partial sums as large as independent
     phases make them, or as the sound itself where they agree (Higham and Mary,
     A New Approach to Probabilistic Rounding Error Analysis, SIAM J. Sci. Comput. 41(5), 2019, for why
     a walk and not the sum of all roundings). Those of the powers in the tables are bounded: each
@@ -179,7 +180,10 @@ def _rounding(amplitudes: AnyArray, peaks: FloatArray, samples: int, level: Synt
     unit = float(np.finfo(np.float32).eps) / 2.0 if level == "fast" else double
     sizes = np.abs(amplitudes)
     whole = np.sqrt(np.sum(sizes**2, axis=1))
-    terms = amplitudes.shape[1] if level == "exact" else longest_sum(amplitudes.shape[1])
+    modes = terms = amplitudes.shape[1]
+    if level != "exact":
+        # So many parts, at most, are added up in one run: those of a group, and then the groups.
+        terms = min(modes, TOGETHER) + modes / TOGETHER + min(modes / TILE, SPLITS)
     walk = np.sqrt((2.0 + terms) / 3.0) * np.maximum(_SIGMAS * np.sqrt(0.5) * whole, peaks)
     block = _block_length(samples)
     powers = np.sqrt(5.0) * (block + samples / block) * sizes.sum(axis=1)

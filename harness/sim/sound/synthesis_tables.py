@@ -49,7 +49,7 @@ _LASTING = 150
 _SHORTEST = 4096
 """Samples from which a sound may be summed by transforms."""
 
-_SPLITS = 24
+SPLITS = 24
 """Groups more than that that ``_LIKE`` can make of a sound of ``_SEGMENT`` blocks, nearly: each sounds
 for less than three quarters of the one before."""
 
@@ -195,11 +195,6 @@ def _together(counts: IntArray) -> list[slice]:
             groups.append(slice(first, tile))
             first = tile
     return [*groups, slice(first, len(counts))]
-
-
-def longest_sum(modes: int) -> float:
-    """How many modes' parts, at most, are added up in one run: those of a group, and then the groups."""
-    return min(modes, TOGETHER) + modes / TOGETHER + min(modes / TILE, _SPLITS)
 
 
 def _width(modes: int) -> int:

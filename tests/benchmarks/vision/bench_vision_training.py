@@ -18,7 +18,7 @@ import numpy as np
 from rich.console import Console
 
 from harness.authoring.vision.data import HeldOutViews, held_out_pictures
-from harness.authoring.vision.metrics import BEHIND, network_pictures, picture_errors, reference_pictures
+from harness.authoring.vision.metrics import BEHIND, picture_errors, reference_pictures
 from harness.authoring.vision.profiles import VisionProfile, vision_profile
 from harness.authoring.vision.vision import AuthoredVision, author_vision
 from harness.basics.arrays import ByteArray
@@ -30,8 +30,8 @@ from harness.picture.linear_image import LinearImage
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import Appearance
 from harness.sim.light.appearance_source import appearance_of
-from harness.sim.light.direct_image import LitObject
-from harness.sim.light.lambert import irradiance, places_seen, radiance, sees_light
+from harness.sim.light.direct_image import LitObject, irradiance, sees_light
+from harness.sim.light.lambert import places_seen, radiance
 
 CONSOLE = Console(width=140, highlight=False, emoji=False)
 
@@ -125,7 +125,8 @@ def by_ways(look: Appearance, data: bytes, profile: VisionProfile, given: argpar
     renderer = VisionRenderer(data, look.mesh, given.threads)
     drawn: dict[str, list[LinearImage]] = {}
     for way, settings in WAYS.items():
-        drawn[way] = network_pictures(renderer, held_out, settings)
+        views = zip(held_out.cameras, held_out.lights, strict=True)
+        drawn[way] = [renderer.render(camera, light, settings).image for camera, light in views]
         each = [difference(a, b) for a, b in zip(drawn[way], drawn["default"], strict=True)]
         apart = 255.0 * np.sqrt(np.mean(each))
         errors = picture_errors(exact, drawn[way])

@@ -14,6 +14,7 @@ from harness.objects.household import build
 from harness.report.data import (
     AnswerRow,
     Artefact,
+    BenchPart,
     BenchScene,
     ContactRow,
     EffectRun,
@@ -27,7 +28,7 @@ from harness.report.data import (
     StrikeLine,
     TwinDeviation,
 )
-from harness.report.figures.pictures import arm_parts, object_part, sensor_parts, table_and_pedestal
+from harness.report.figures.pictures import CLAY, arm_parts, sensor_parts, table_and_pedestal
 from harness.report.values import Missing, Posterior
 from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
 
@@ -158,7 +159,7 @@ def sample() -> ReportData:
     joints = joints_for("ur5e", gels[-1] @ GEL_FROM_FLANGE)[4]
     bench = BenchScene(
         (
-            object_part(mesh, BASE_FROM_OBJECT),
+            BenchPart(mesh, BASE_FROM_OBJECT, CLAY),
             *table_and_pedestal(BASE_FROM_OBJECT, 0.25),
             *sensor_parts(GELSIGHT_R15, gels[-1], GEL_FROM_FLANGE),
             *arm_parts("ur5e", joints),

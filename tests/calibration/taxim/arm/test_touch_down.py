@@ -46,7 +46,7 @@ def middle_at_depth(change: FloatArray) -> FloatArray:
 
 @pytest.mark.parametrize("place", [(60.0, 45.0), (31.4, 60.7), (88.6, 30.2)])
 def test_even_light_shows_the_place_by_every_way(place: tuple[float, float]) -> None:
-    for seen in touch_downs([descent(*place, NONE)], BALL):
+    for seen in touch_downs([descent(*place, NONE)], BALL)[0]:
         assert seen[0] == pytest.approx(place, abs=BETTER)
 
 
@@ -55,13 +55,13 @@ def test_uneven_light_moves_the_middle_and_hardly_the_touch() -> None:
     change = descent(*place, STRONG)
     wrong = np.hypot(*(middle_at_depth(change) - place))
     assert wrong > 0.8
-    for seen in touch_downs([change], BALL):
+    for seen in touch_downs([change], BALL)[0]:
         assert np.hypot(*(seen[0] - place)) < 0.25 * wrong
 
 
 def test_noise_of_a_grey_level_moves_it_by_less_than_a_fifth_of_a_pixel() -> None:
     place = (52.7, 40.1)
-    each = touch_downs([descent(*place, NONE, 1.0, seed) for seed in range(12)], BALL)
+    each = touch_downs([descent(*place, NONE, 1.0, seed) for seed in range(12)], BALL)[0]
     for way, seen in zip(WAYS, each, strict=True):
         if way.degree == 1:
             assert np.std(seen, axis=0).max() < 0.2
@@ -69,13 +69,13 @@ def test_noise_of_a_grey_level_moves_it_by_less_than_a_fifth_of_a_pixel() -> Non
 
 def test_moving_the_ball_moves_the_touch_as_far() -> None:
     here, there = descent(40.25, 35.5, STRONG), descent(73.5, 52.75, STRONG)
-    for seen in touch_downs([here, there], BALL):
+    for seen in touch_downs([here, there], BALL)[0]:
         assert seen[1] - seen[0] == pytest.approx([33.25, 17.25], abs=0.08)
 
 
 def test_nothing_seen_is_not_a_place() -> None:
     still = np.zeros((PICTURES, ROWS, COLUMNS, 3))
     none = np.zeros((0, ROWS, COLUMNS, 3))
-    for seen in touch_downs([still, none, descent(60.0, 45.0, NONE)[:2]], BALL):
+    for seen in touch_downs([still, none, descent(60.0, 45.0, NONE)[:2]], BALL)[0]:
         assert np.isnan(seen).all()
-    assert all(seen.shape == (0, 2) for seen in touch_downs([], BALL))
+    assert all(seen.shape == (0, 2) for seen in touch_downs([], BALL)[0])

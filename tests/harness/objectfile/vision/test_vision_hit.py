@@ -13,7 +13,8 @@ from harness.objectfile.vision.hit import HitSurface, LampGrid, SurfacePoints
 from harness.objects.household import build
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import plain
-from harness.sim.light.lambert import irradiance, places_seen, sees_light
+from harness.sim.light.direct_image import irradiance, sees_light
+from harness.sim.light.lambert import places_seen
 from tests.oracles.plain_look import looking
 
 MUG = build("mug")

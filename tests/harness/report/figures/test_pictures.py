@@ -12,7 +12,8 @@ from harness.report.data import BenchPart, ErrorCurve
 from harness.report.figures.charts import error_chart
 from harness.report.figures.pictures import Heat, box, cylinder
 from harness.report.figures.shading import Shot, back_projected, look_at, see
-from harness.report.figures.tiles import difference, height_picture, png
+from harness.report.figures.tiles import difference, png
+from harness.report.page import height_picture
 from harness.report.values import Posterior
 from harness.report.wording import duration, millimetres
 
