@@ -77,6 +77,15 @@ def view_along(
 def view_of(
     depth: FloatArray, object_from_gel: FloatArray, origin: FloatArray, pitch: float, sensor: TactileSensor
 ) -> ToolView:
+    """A view of a depth image, with the range of depths at which the gel's window meets something.
+
+    Args:
+        depth: ``(rows, columns)`` metres along the tool to the first surface; inf where none.
+        object_from_gel: ``(3, 3)`` rotation; its third column is the way the tool points.
+        origin: ``(2,)`` metres across the tool, of the first pixel's centre.
+        pitch: metres a pixel.
+        sensor: gives the gel's window and thickness.
+    """
     # The rows first, by whole rows at a time: several times as fast as blocks.
     by_rows = np.minimum.reduceat(depth, np.arange(0, depth.shape[0], POOL), axis=0)
     pooled = np.asarray(np.minimum.reduceat(by_rows, np.arange(0, depth.shape[1], POOL), axis=1))
