@@ -44,7 +44,7 @@ REBASED: dict[str, str] = {
     "object_vision.json: errors: *": "0014",
     "objects/vision/object.json: vision: network: measured: *": "0014",
 }
-"""Patterns of places that may differ, such as ``object_vision.json: *``, with the number of the decision record."""
+"""Patterns of places that may differ, such as ``object_vision.json: *``, with the decision record of each."""
 
 RUNS = {
     "mug": ("contact-localization", "--scene", "{code}/scenes/mug_both.toml", "--seed", "11"),
