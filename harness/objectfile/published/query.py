@@ -12,7 +12,7 @@ from harness.objectfile.runtime import Network
 _BATCH = 16384
 """Rows in one run of a network."""
 
-_ROUNDING = 1e-6
+FLOAT32_SLACK = 1e-6
 """Slack relative to a range: the bounds of a published file are often float32."""
 
 
@@ -47,7 +47,9 @@ def query(network: Network, inputs: Mapping[str, AnyArray], rows: int = _BATCH) 
     return outputs
 
 
-def require_trained(values: FloatArray, low: Any, high: Any, what: str, unit: str) -> None:
+def require_trained(
+    values: FloatArray, low: Any, high: Any, what: str, unit: str, slack: float = FLOAT32_SLACK
+) -> None:
     """Refuse queries outside of the range that a network was trained in.
 
     Args:
@@ -56,13 +58,14 @@ def require_trained(values: FloatArray, low: Any, high: Any, what: str, unit: st
         high: greatest numbers, ``(k,)`` or one for all.
         what: noun for a query in the message.
         unit: unit of the numbers.
+        slack: fraction of the range by which a query may exceed it.
 
     Raises:
         OutOfDomain: naming the first query outside.
     """
     low, high = (np.broadcast_to(np.asarray(bound, np.float64), values.shape[1:]) for bound in (low, high))
-    slack = _ROUNDING * (high - low)
-    outside = np.flatnonzero(((values < low - slack) | (values > high + slack)).any(axis=1))
+    margin = slack * (high - low)
+    outside = np.flatnonzero(((values < low - margin) | (values > high + margin)).any(axis=1))
     if len(outside):
         number, least, greatest = (
             ", ".join(f"{value:.6g}" for value in row) for row in (values[outside[0]], low, high)
@@ -81,6 +84,7 @@ def coordinate_bounds(
     option: str,
     what: str,
     unit: str,
+    slack: float = FLOAT32_SLACK,
 ) -> tuple[float, float]:
     """Return the least and greatest coordinate that a network of version 1.0 normalises its queries by.
 
@@ -94,6 +98,7 @@ def coordinate_bounds(
         option: option of the import that takes the bounds.
         what: noun for a point in messages.
         unit: unit of the coordinates.
+        slack: fraction of the range by which a point may exceed it.
 
     Raises:
         WrongUse: no bounds were given.
@@ -107,5 +112,5 @@ def coordinate_bounds(
             f"publish: import the file again with {option} LOW HIGH in {unit}, or say --objectfolder-compat "
             "to take the query's own, as its program does"
         )
-    require_trained(queried, *given, what, unit)
+    require_trained(queried, *given, what, unit, slack)
     return given

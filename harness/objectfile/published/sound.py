@@ -118,7 +118,13 @@ def spectrum_sounds(
         place = (point + np.array(entry.translation)) * entry.scale * entry.grid
         near = voxels[tree.query(place, NEAREST)[1]]
         low, high = coordinate_bounds(
-            entry.bounds, near, of_query=of_query, option="--audio-bounds", what="voxel", unit="voxels"
+            entry.bounds,
+            near,
+            of_query=of_query,
+            option="--audio-bounds",
+            what="voxel",
+            unit="voxels",
+            slack=0.0,
         )
         if not high > low:
             raise OutOfDomain(

@@ -27,6 +27,9 @@ SEEN_DEPTH = (33.9e-3, 40.0e-3)
 DEPTH_PIXELS = (120, 160)
 """Rows and columns of a map of 2.0."""
 
+_SLACK = 1e-9
+"""Fraction of the range by which an angle or a depth may exceed its limit."""
+
 
 def touch_maps(
     of: PublishedObject, entry: PublishedDepthEntry, vertices: FloatArray, gel: FloatArray
@@ -45,8 +48,8 @@ def touch_maps(
     """
     least, most = entry.depth_m
     require_trained(vertices, entry.low_m, entry.high_m, "press", "m")
-    require_trained(np.degrees(gel[:, :1]), 0.0, math.degrees(entry.most_tilt_rad), "tilt", "deg")
-    require_trained(1e3 * gel[:, 2:], 1e3 * least, 1e3 * most, "depth", "mm")
+    require_trained(np.degrees(gel[:, :1]), 0.0, math.degrees(entry.most_tilt_rad), "tilt", "deg", _SLACK)
+    require_trained(1e3 * gel[:, 2:], 1e3 * least, 1e3 * most, "depth", "mm", _SLACK)
     network = of.network(entry.network)
     maps = np.empty((len(vertices), entry.rows, entry.columns))
     for number, (vertex, (tilt, azimuth, depth)) in enumerate(zip(vertices, gel, strict=True)):
