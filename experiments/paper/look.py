@@ -31,7 +31,7 @@ from harness.authoring.vision.data import HeldOutViews, held_out_pictures
 from harness.authoring.vision.metrics import BEHIND, reference_pictures
 from harness.authoring.vision.profiles import CellsSpec, vision_profile
 from harness.authoring.vision.surface_cells import surface_cells
-from harness.authoring.vision.vision import networks_alone
+from harness.authoring.vision.vision import train_networks
 from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray
 from harness.basics.errors import DataRefused
 from harness.basics.mesh import Mesh
@@ -184,7 +184,7 @@ class CellFields:
 
     @cached_property
     def occupied(self) -> BoolArray:
-        """``(x, y, z)`` voxels that the surface meets and their neighbours, padded by one on each side."""
+        """Mark voxels that intersect the surface, and their neighbours; one voxel of padding per side."""
         return binary_dilation(np.pad(self.shell.table >= 0, 1), np.ones((3, 3, 3), np.bool_))
 
     def picture(self, camera: Pinhole, light: DirectionalLight) -> ByteArray:
@@ -316,7 +316,9 @@ def _by_cells(bench: ViewBench, work: RenderingWork) -> MadeMethod:
     def train() -> bytes:
         with TemporaryDirectory() as folder:
             checkpoint = Path(folder) / "cells.npz"
-            model = networks_alone(bench.lit, bench.views, KILO_OSF, _SEED, checkpoint, work.report, 1)
+            model = train_networks(
+                bench.lit, bench.views, KILO_OSF, _SEED, checkpoint, work.report, 1
+            ).finish()
         return vision_graph(model).SerializeToString()
 
     identity = ("kilo osf", bench.identity, asdict(KILO_OSF.size), *astuple(KILO_OSF)[1:])

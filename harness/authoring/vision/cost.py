@@ -16,7 +16,7 @@ from harness.authoring.vision.cells import VERSION
 from harness.authoring.vision.data import HeldOutViews
 from harness.authoring.vision.metrics import BEHIND, picture_errors, reference_pictures
 from harness.authoring.vision.profiles import CellsSpec
-from harness.authoring.vision.vision import networks_alone
+from harness.authoring.vision.vision import train_networks
 from harness.basics.store import digest
 from harness.basics.whole_file import write_bytes_whole
 from harness.cost.curve import ErrorUnit, Point, Sample
@@ -119,7 +119,9 @@ class Studio:
         name = self._key(spec, seed)
         kept, checkpoint = folder / f"{name}.onnx", folder / f".{name}.npz"
         if not kept.is_file():
-            model = networks_alone(self.lit, self.held_out, spec, seed, checkpoint, report, self.threads)
+            model = train_networks(
+                self.lit, self.held_out, spec, seed, checkpoint, report, self.threads
+            ).finish()
             write_bytes_whole(kept, vision_graph(model).SerializeToString())
             checkpoint.unlink(missing_ok=True)
         data, mesh = kept.read_bytes(), self.lit.appearance.mesh

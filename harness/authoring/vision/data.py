@@ -23,7 +23,7 @@ FACING = 0.85
 """Share of the lights that are drawn on the side that is seen; the others are from anywhere."""
 
 LEAST_YIELD = 1e-3
-"""Of the places drawn at once: below it nothing of the surface can be seen and nothing will come."""
+"""Minimum fraction of sampled points that are visible; below it the surface cannot be seen from outside."""
 
 
 @dataclass(frozen=True, eq=False)

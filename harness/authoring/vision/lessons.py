@@ -132,12 +132,11 @@ def draw_lamps(count: int, seed: int, held_out: HeldOutViews) -> AnyArray:
 def _chunk(
     lit: LitObject, voxel: float, random: np.random.Generator, held_out: HeldOutViews, both: bool, lamps: int
 ) -> Lessons:
-    # Faces, weights, points and views are drawn as ``vision_data.draw_tuples`` does.
     mesh = lit.appearance.mesh
     faces, weights = surface_places(mesh, _CHUNK, random)
     side = np.where(random.random(_CHUNK) < 0.5, -1.0, 1.0) if both else np.ones(_CHUNK)
     normals = side[:, None] * mesh.face_normals[faces]
-    # A unit normal plus a place on the unit ball is a direction drawn with the cosine.
+    # A unit normal plus a place on the unit ball is a direction sampled with the cosine as density.
     total = normals + (1.0 - 1e-6) * sphere(len(normals), random)
     views = -(total / np.linalg.norm(total, axis=1, keepdims=True))
     corners = mesh.corners[faces]

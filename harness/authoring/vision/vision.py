@@ -64,7 +64,7 @@ def author_vision(
     references = reference_pictures(lit, held_out, profile.samples)
     clock.lap("references")
     spec, checkpoint = profile.networks, folder / CHECKPOINT
-    training = _trained(lit, held_out, spec, seed, checkpoint, report, threads, clock)
+    training = train_networks(lit, held_out, spec, seed, checkpoint, report, threads, clock)
     model = training.finish()
     report("measuring", 0.0)
     data = vision_graph(model).SerializeToString()
@@ -80,7 +80,7 @@ def author_vision(
     return AuthoredVision(model, errors, settings, clock.seconds)
 
 
-def networks_alone(
+def train_networks(
     lit: LitObject,
     held_out: HeldOutViews,
     spec: CellsSpec,
@@ -88,31 +88,21 @@ def networks_alone(
     checkpoint: Path,
     report: Report,
     threads: int | None = None,
-) -> VisionModel:
-    """Networks as ``author_vision`` makes them, not judged; arguments and errors as there.
+    clock: Laps | None = None,
+) -> CellTraining:
+    """Train an object's networks without measuring their errors; raises as ``author_vision``.
 
     Args:
         lit: the object.
-        held_out: what nothing is learned from.
-        spec: of the networks.
-        seed: of all that is drawn.
-        checkpoint: file that a killed training goes on from; it is left there.
-        report: told of progress.
-        threads: None for as many as the process has cores.
+        held_out: views that no training sample is close to.
+        spec: specification of the networks.
+        seed: random seed.
+        checkpoint: file from which an interrupted training continues; it is left in place.
+        report: receives the progress.
+        threads: number of threads; None for all cores of the process.
+        clock: receives the seconds by stage.
     """
-    return _trained(lit, held_out, spec, seed, checkpoint, report, threads, Laps()).finish()
-
-
-def _trained(
-    lit: LitObject,
-    held_out: HeldOutViews,
-    spec: CellsSpec,
-    seed: int,
-    checkpoint: Path,
-    report: Report,
-    threads: int | None,
-    clock: Laps,
-) -> CellTraining:
+    clock = Laps() if clock is None else clock
     report("drawing places", 0.0)
     grid = surface_cells(lit.appearance.mesh, spec.cells)
     voxel = grid.cell / PER_CELL
