@@ -109,7 +109,7 @@ def set_rate(adam: torch.optim.Adam, first: float, share: float) -> None:
 
 
 class EncodedPerceptron(nn.Module):
-    """``(k, encoded)`` to ``(k, outputs)``: ReLU after every layer but the last."""
+    """Perceptron from ``(k, encoded)`` to ``(k, outputs)``, with ReLU after every layer but the last."""
 
     def __init__(self, spec: FitSpec, inputs: int, outputs: int, random: np.random.Generator) -> None:
         super().__init__()
@@ -461,7 +461,7 @@ def train_audionet(bench: StrikeBench, spec: FitSpec, report: Report) -> bytes:
 
 
 class PressRows:
-    """Pixels of possible presses at the places to learn from, drawn at random."""
+    """Sampler of training pixels from feasible presses at the training points."""
 
     def __init__(self, bench: TouchBench, batch: int) -> None:
         self._batch, places = batch, bench.places
@@ -478,7 +478,7 @@ class PressRows:
         self._scale = np.float32(places.sensor.gel_thickness)
 
     def __call__(self, random: np.random.Generator) -> tuple[FloatArray, AnyArray, AnyArray]:
-        """``(batch, 9)`` inputs, ``(batch, 1)`` depths in thicknesses of the gel, and even weights."""
+        """Sample ``(batch, 9)`` inputs, ``(batch, 1)`` depths in gel thicknesses, and uniform weights."""
         which = random.integers(len(self._maps), size=self._batch)
         pixel = random.integers(self._maps.shape[1], size=self._batch)
         rows = self._inputs.rows(self._presses[which], pixel)

@@ -74,7 +74,7 @@ def by_average(evidence: ShapeEvidence) -> ShapeEstimate:
 
 @cache
 def mean_occupancy() -> FloatArray:
-    """``(corners,)`` fraction of shapes that fill each corner of a grid over the unit cube on the support."""
+    """Return the fraction of shapes that fill each corner of a grid over the unit cube, ``(corners,)``."""
     names, random = list(FAMILIES), np.random.default_rng(_SEED)
     pitch = 1.0 / (_CORNERS - 1)
     low = np.array([-0.5, -0.5]) + pitch * np.array([1.1e-4, 1.7e-4])
@@ -176,7 +176,7 @@ def _visual_field(
     points: FloatArray,
     within: tuple[FloatArray, float, float],
 ) -> FloatArray:
-    """``(n,)`` distance of points from the visual hull, m; negative inside, not below -1."""
+    """Return the signed distances of points from the visual hull in m; negative inside, at least -1."""
     sight, near, far = within
     along = points @ sight
     outside = np.maximum(np.maximum(near - along, along - far), -points[:, 2])
@@ -246,7 +246,7 @@ def glance_points(evidence: ShapeEvidence) -> FloatArray:
 
 
 def interpolate(points: FloatArray, neighbours: int = NEIGHBOURS) -> FloatArray:
-    """``(n (1 + neighbours), 3)`` the points, then the midpoints between each and its nearest ones, m.
+    """Append the midpoints between each point and its nearest neighbours: ``(n (1 + neighbours), 3)`` in m.
 
     The paper's network folds a learned patch around every point. On a surface with little curvature between
     neighbours, their midpoints lie on it as well, to the square of the distance over eight radii.

@@ -191,7 +191,7 @@ class PlacedShape:
 
     @property
     def turn(self) -> FloatArray:
-        """``(3, 3)`` rotation from the library shape to ``stand``."""
+        """Rotation ``(3, 3)`` from the library shape to ``stand``."""
         return rotation_about(np.array([0.0, 0.0, 1.0]), self.yaw)
 
 

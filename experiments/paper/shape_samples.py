@@ -59,14 +59,14 @@ _FROM_ONE_SIDE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class TouchedShape:
-    """A shape that stands on z = 0, and the presses on it."""
+    """A shape resting on z = 0, and the presses on it."""
 
     mesh: Mesh  #: its surface, m.
     seed: int  #: seed of the surface points.
 
     @cached_property
     def dense(self) -> tuple[FloatArray, FloatArray]:
-        """``(DENSE, 3)`` surface points, m, and their normals."""
+        """Surface points, ``(DENSE, 3)`` in m, and their normals."""
         places, faces = random_points(self.mesh, DENSE, np.random.default_rng((self.seed, 1)))
         return places, self.mesh.face_normals[faces]
 
@@ -80,7 +80,7 @@ class TouchedShape:
         return cKDTree(self.dense[0])
 
     def _has_room(self, places: FloatArray, normals: FloatArray) -> BoolArray:
-        """Whether rays from the corners and centre of the sensor's face are free and above the support."""
+        """Mark points at which the sensor's face is free of the shape and above the support."""
         x, y = HOUSING
         corners = np.array([(0.0, 0.0), (x, y), (-x, y), (x, -y), (-x, -y)])
         across = np.stack([frame_facing(normal, 0.0)[:, :2] for normal in normals])

@@ -50,7 +50,7 @@ class PointEncoder(nn.Module):
         self.code = nn.Linear(third, code)
 
     def forward(self, touched: Tensor) -> Tensor:
-        """``(n, code)``."""
+        """Encode point sets as ``(n, code)``."""
         each = self.points[1](torch.relu(self.points[0](touched)))
         over_all = each.max(dim=1, keepdim=True).values
         each = torch.relu(self.beside(each) + self.greatest(over_all))

@@ -396,7 +396,7 @@ def between_nodes(modes: Modes, allowed: BoolArray, each: int, seed: int) -> Sou
 
 
 def _elements(faces: IntArray) -> tuple[IntArray, bool]:
-    """``(f, 6)`` corners and middles, True; or the triangles themselves, False."""
+    """Group faces into quadratic triangles ``(f, 6)`` and return True, or return the triangles and False."""
     count, rest = divmod(len(faces), _QUADRATIC_PARTS)
     if rest or count == 0:
         return faces, False

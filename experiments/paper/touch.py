@@ -68,10 +68,10 @@ SMALL_CODES: Final = CodesSpec(most_bytes=1_000_000, pitch=0.8e-3)
 """Ours, smaller than the profile ``smoke``."""
 
 PRESS_SEED = 11
-"""Of places and presses."""
+"""Random seed of points and presses."""
 
 NETWORK_SEED = 0
-"""Of codes and of 2.0's network."""
+"""Random seed of the codes and of 2.0's network."""
 
 SPACING = 5e-3
 """m between places that networks of the table may learn from."""
@@ -194,7 +194,7 @@ def pixel_places(shape: tuple[int, int]) -> FloatArray:
 
 
 def colours_pair() -> tuple[Input, Tensor]:
-    """What the network takes and gives."""
+    """Describe the input and the output tensor of the network."""
     box = Domain(low=(0.0, 0.0, 0.0, -1.0, -1.0), high=(1.0,) * COLOUR_INPUTS)
     meaning = "x y z, 0 to 1; row and column, -1 to 1"
     place = graph_input("place", "float64", ("n", COLOUR_INPUTS), "1", meaning, box)
@@ -234,7 +234,7 @@ class PressInputs:
         return cls(least, 1.0 / (most - least), sensor.columns)
 
     def rows(self, presses: Presses, pixels: IntArray) -> FloatArray:
-        """``(k, 9)``, of ``(k,)`` pixels, counted row by row, each of its own press or all of one."""
+        """Return ``(k, 9)`` inputs for ``(k,)`` row-major pixel indices, one press each or one for all."""
         rows = np.empty((len(pixels), PRESS_INPUTS))
         rows[:, :3], rows[:, 3] = presses.points, presses.tilts
         rows[:, 4], rows[:, 5] = np.cos(presses.azimuths), np.sin(presses.azimuths)
@@ -244,7 +244,7 @@ class PressInputs:
 
 
 def touchnet_pair() -> tuple[Input, Tensor]:
-    """What the network takes and gives."""
+    """Describe the input and the output tensor of the network."""
     box = Domain(low=(0.0,) * 4 + (-1.0,) * 2 + (0.0,) * 3, high=(1.0,) * PRESS_INPUTS)
     meaning = "place x y z, tilt, cosine and sine of its azimuth, depth, row, column"
     pixel = graph_input("pixel", "float64", ("n", PRESS_INPUTS), "1", meaning, box)

@@ -43,7 +43,7 @@ class ShapeCell:
 
     @property
     def conditions(self) -> dict[str, str]:
-        """What was varied."""
+        """Conditions of the run by name."""
         return {"gap": self.gap, "choose": self.choose}
 
 

@@ -202,7 +202,7 @@ def _chart(
 
 
 def height_picture(height: FloatArray, highest: float) -> ByteArray:
-    """``(rows, columns, 3)`` of indentation in metres, dark at 0 and bright at ``highest``."""
+    """Colour an indentation map in m as ``(rows, columns, 3)``, dark at 0 and bright at ``highest``."""
     level = np.clip(height / highest, 0.0, 1.0) if highest > 0.0 else np.zeros_like(height)
     colours = mpl.colormaps["viridis"](level)[..., :3]
     return np.asarray(np.round(255.0 * colours), dtype=np.uint8)

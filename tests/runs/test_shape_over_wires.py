@@ -24,7 +24,7 @@ SAME_SURFACE = 0.5e-3
 
 
 PRESSES = {"bowl": "8"}
-"""Of those that four blind presses mostly meet with the housing: too few contacts bound no surface."""
+"""Number of presses by object, where four blind presses mostly end on the housing."""
 
 
 def surfaces(result: dict[str, Any]) -> dict[str, Any]:

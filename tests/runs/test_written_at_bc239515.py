@@ -1,4 +1,4 @@
-"""What the program of commit bc239515 wrote still opens, and its recordings are answered as it answered them.
+"""Files written at commit bc239515 still open, and its recordings still give the same estimates.
 
 ``tests/samples/written_at_bc239515`` holds a short recording of each experiment, made on the mocked bench in
 process (the files that all three share are kept once, in ``common``), an ObjectFile with a sound, a file of

@@ -177,7 +177,7 @@ def press_name(step: int) -> str:
 
 
 def _on_gel(poses: Reading, recording: Recording) -> FloatArray:
-    """``(2,)`` m: the ball's stated place on the gel, mean over the packets that came with it."""
+    """Return the ball's nominal ``(2,)`` position on the gel in m, averaged over the frame's arm packets."""
     station = RunFiles(recording).station
     ball = np.asarray(recording.header.plan["ball_in_base_m"], dtype=np.float64)
     each = []

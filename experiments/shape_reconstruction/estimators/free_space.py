@@ -21,9 +21,9 @@ _CONTACT_BEYOND = 0.7
 
 
 def sensor_depth(evidence: ShapeEvidence, points: FloatArray) -> FloatArray:
-    """``(n,)`` m that ``(n, 3)`` points are deep in what the sensor's housing passed; below 0 beside it.
+    """Return the ``(n,)`` depth of points inside the volume swept by the housing, in m; negative outside.
 
-    The housing and all the space it came through are one box, since its way is straight along its axis.
+    The housing and the space that it moved through are one box, since it moves straight along its axis.
     """
     deepest = np.full(len(points), -np.inf)
     for touch in evidence.distinct:

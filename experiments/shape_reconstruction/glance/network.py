@@ -24,7 +24,7 @@ GIVEN = 1024
 """Points that the network gives."""
 
 SIDE = 96
-"""Pixels along each side of the window: 4 mm each for an object of 0.2 m."""
+"""Side of the window in pixels: 4 mm per pixel for an object of 0.2 m."""
 
 SPAN = 1.0
 """Half the width of the window, relative to the reach of the frame."""

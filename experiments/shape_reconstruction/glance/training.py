@@ -224,7 +224,7 @@ def _mirrored(given: list[Tensor], whole: Tensor, draw: torch.Generator) -> tupl
 
 
 def chamfer(found: Tensor, wanted: Tensor) -> Tensor:
-    """``(n,)`` half the sum of both mean distances between ``(n, a, 3)`` and ``(n, b, 3)`` points."""
+    """Compute the ``(n,)`` Chamfer-L1 distances between ``(n, a, 3)`` and ``(n, b, 3)`` points."""
     # The root is taken of the nearest squares alone: a root of every pair costs more than all the rest.
     with torch.no_grad():
         apart = torch.cdist(found, wanted)

@@ -1,4 +1,4 @@
-"""From a surface to the codes of its touch, and what they are worth on presses they never saw.
+"""Create the touch codes of a surface and measure their errors on presses that were held out.
 
 ``code_surface`` makes the codes: heights around the nodes, over their mean.
 """
@@ -56,7 +56,7 @@ _CHUNK = 16
 
 @dataclass(frozen=True, eq=False)
 class AuthoredTouch:
-    """Codes and their worth."""
+    """Touch codes and their measured errors."""
 
     codes: CodesPart  #: to be written.
     errors: Mapping[str, Mapping[str, Mapping[str, float]]]

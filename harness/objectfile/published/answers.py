@@ -92,7 +92,7 @@ class QuerySettings:
 
 @dataclass(eq=False)
 class AnsweredQueries:
-    """What was written."""
+    """Files written for a set of query files, and their cost."""
 
     files: dict[str, list[Path]] = field(default_factory=dict)  #: by sense, in the order of the queries.
     full_scale: float | None = None  #: of the sounds, in the sound's unit; None for each its own.

@@ -29,7 +29,7 @@ COMPAT_DISTANCE = 2.5
 """Distance from the origin of every camera that the published networks were trained by."""
 
 FOCAL = 355.5555419921875
-"""Pixels, of a picture of 256."""
+"""Focal length in pixels of a 256 x 256 image."""
 
 SIZE = 256
 
@@ -135,8 +135,8 @@ def raw_look_tensors(rows: tuple[int | Literal["n"], ...]) -> tuple[Tensor, ...]
 
 
 RawField = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
-"""``(n, 3)`` points in the vision frame, ``(n, 3)`` unit views from the camera and the ``(3,)`` unit
-direction of the light, to ``(n, 4)`` raw red, green, blue and density; zeros where nothing can be."""
+"""Function from ``(n, 3)`` points in the vision frame, ``(n, 3)`` unit view directions from the camera and
+the ``(3,)`` unit light direction to ``(n, 4)`` raw red, green, blue and density; zeros in empty space."""
 
 
 @dataclass(frozen=True, eq=False)

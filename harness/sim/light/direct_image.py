@@ -245,7 +245,7 @@ def _nearest(count: int, step: int) -> int:
 
 
 def irradiance(places: Places, light: DirectionalLight, size: float) -> FloatArray:
-    """``(n,)`` what falls on each place where nothing is in the light's way.
+    """Compute the ``(n,)`` unoccluded irradiance of each point.
 
     Args:
         places: of the surface.
@@ -256,7 +256,7 @@ def irradiance(places: Places, light: DirectionalLight, size: float) -> FloatArr
 
 
 def sees_light(rays: RayMesh, places: Places, light: DirectionalLight, asked: BoolArray) -> BoolArray:
-    """Whether nothing is between each place and the light.
+    """Test each point for an unoccluded path to the light.
 
     Args:
         rays: of the same surface.

@@ -1,4 +1,4 @@
-"""What reference pictures err and cost: samples a pixel, shadows, two programs.
+"""Measure error and cost of reference pictures: samples per pixel, shadows, two programs.
 
 python tests/benchmarks/vision/bench_vision_reference.py builtin:mug builtin:bowl --size 256
 python tests/benchmarks/vision/bench_vision_reference.py builtin:mug \
