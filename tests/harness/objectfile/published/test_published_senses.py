@@ -84,6 +84,7 @@ def test_a_strike_outside_of_the_trained_box_is_refused(second: Any) -> None:
         ((0.3, 0.0, 1e-3), r"tilt 0 at \(17.1887\) deg"),
         ((-0.01, 0.0, 1e-3), r"tilt 0 at \(-0.57"),
         ((0.0, 0.0, 2.1e-3), r"depth 0 at \(2.1\) mm"),
+        ((0.0, 0.0, 2e-3 + 1e-9), r"depth 0 at \(2\) mm"),
         ((0.0, 0.0, 0.4e-3), r"depth 0 at \(0.4\) mm"),
     ],
 )
