@@ -114,10 +114,10 @@ class LabChild:
 def _begin(run: Callable[[ChildPipe], None], connection: Connection, parent: int) -> None:
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it died before it could be asked
+    if os.getppid() != parent:  # the parent exited before the signal was set
         os._exit(0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the lab's to answer
-    # Nothing a child prints may enter the lab's answers, nor may it read what is said to the lab.
+    # Keep the child's output out of the lab's replies, and the lab's input out of the child.
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)
     try:

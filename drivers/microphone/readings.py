@@ -70,7 +70,7 @@ def fit_clock(indices: FloatArray, times: FloatArray, nominal_rate: float) -> Sa
     scale = _SHARPNESS
     offset = stretch = 0.0
     for _ in range(_ROUNDS):
-        # The weighted line; its slope is drawn to zero as `CRYSTAL_DRIFT` demands of noise of this scale.
+        # Weighted linear fit; `CRYSTAL_DRIFT` is the prior deviation of its slope.
         total = weights.sum()
         mean_x, mean_y = weights @ elapsed / total, weights @ excess / total
         spread = weights @ (elapsed - mean_x) ** 2 + (scale / CRYSTAL_DRIFT) ** 2

@@ -64,7 +64,7 @@ surfaces are within; the F-score; the stated deviation, and the fractions of bot
 holds; the fraction of gross errors whose answer names no extent as not bounded."""
 
 FEW = (2, 4, 6)
-"""Numbers of presses that the best method is answered from too, beside a picture."""
+"""Numbers of presses that the best method is answered from too, together with a picture."""
 
 FLOOR, AVERAGE = "the truth itself", "average"
 """Rows that read nothing: the true surface as an answer, whose published form is the floor of all others; and

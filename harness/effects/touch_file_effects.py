@@ -1,4 +1,4 @@
-"""The touch of an ObjectFile in a scene: a level of the gel's surface beside rasteriser and skirt.
+"""The touch of an ObjectFile in a scene: a level of the gel's surface like the rasteriser's.
 
 Sources, beside those of the touch: ``object.file`` (the object's ``ObjectFile``) and ``object.wall`` (m, or
 None for a mesh of the material itself); asked for only where the gel's surface comes from the file. Its

@@ -191,14 +191,14 @@ def _delays(strikes: Sequence[Strike]) -> list[float | None]:
     frequencies, transfer = _transfers(strikes)
     turns = np.exp(4j * np.pi * np.outer(_TRIED, frequencies))
     known = list(range(len(strikes)))
-    # A place to start from: the delay by which each strike fits those before it best.
+    # Initial estimate: the delay with which each strike fits those before it best.
     delays = np.zeros(len(transfer))
     for k in range(1, len(transfer)):
         fit = _fit(k, delays[: k + 1], transfer[: k + 1], frequencies, turns)
         delays[k] = _TRIED[np.argmax(fit)]
     while len(known) > 1:
         delays, fits = _together(delays, transfer[known], frequencies, turns)
-        # By how much each delay is too incoherent or ambiguous to be believed; not above zero where it is.
+        # Shortfall in coherence or uniqueness of each delay; at most zero for an accepted one.
         doubt = []
         for fit in fits:
             best = int(np.argmax(fit))

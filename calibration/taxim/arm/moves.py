@@ -94,7 +94,7 @@ def arm_scale(
     every = np.array([_numbers(one.gel_from_pixels) for one in maps])
     middle = np.mean([one.gel_from_pixels for one in maps], axis=0)
     values = _numbers(middle)
-    # Variances of the numbers by the scatter: first order, both axes of the arm alike.
+    # Variances of the numbers by the scatter: first order, the same for both axes of the arm.
     variances = []
     for one in maps:
         slopes = _slopes(_numbers, one.gel_from_pixels)

@@ -173,7 +173,7 @@ class BallPresses:
             # The frame before the last may have been exposed while the arm still moved.
             frames = bench.gel.read(2, wanted.still.timeout)
             frame = Reading(frames.channel, frames.times[-1:], frames.values[-1:], frames.encoded[-1:])
-            # The strongest change counts, noise blurred away; once it is seen, every frame does.
+            # The largest change after blurring decides; after the first contact every frame is kept.
             if seen or np.abs(gaussian_filter(look(frame) - rest, blur)).max() >= wanted.notice:
                 seen.append(frame)
                 way.append(down)

@@ -276,6 +276,6 @@ def rest_change(pack: PressPack, change: FloatArray) -> FloatArray:
     slow = gaussian_filter(rest, (sigma, sigma, 0.0)) / share[..., None]
     if seen.all():
         return rest - slow
-    # Linear between what is seen and what is not: no seam.
+    # Blend linearly from observed to unobserved pixels, to avoid a seam.
     faded = np.minimum(distance_transform_edt(seen) / (_SEAM * sigma), 1.0)
     return np.asarray(faded[..., None] * (rest - slow))

@@ -144,7 +144,7 @@ def by_touch(
     followed = _FOLLOWED if refined > CHEAP else 1
     scan = [_profile(rough, passed, found, costs, minima[apart[:followed]], logs, followed)]
     for k in apart:
-        # Sizes about the minimum, and the least cost there, with what comes beside it.
+        # Sizes around the minimum, and the minimum cost at each with the other parameters.
         starts = np.tile(minima[k], (len(_FINE), 1))
         starts[:, 0] += min(fine.sigma(minima[k]), 0.25) * _FINE
         _, fine_costs = fine.refined(starts, 6, fixed_size=True)

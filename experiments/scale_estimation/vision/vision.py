@@ -73,7 +73,7 @@ def by_sight(view: View, outline: SeenOutline, nominal: float, sizes: SizeRange)
     _require_same(view, best)
     log_nominal = np.log(nominal)
     density = np.full(len(sizes.logs), -np.inf)
-    separate: list[OutlineFit] = []  # the minima worth a scan, of each place and turn one
+    separate: list[OutlineFit] = []  # minima to scan, one per position and rotation
     for fit in sorted(fits, key=lambda fit: fit.cost):
         new = all(abs(fit.unknowns[0] - one.unknowns[0]) > 2e-3 for one in separate)
         if fit.cost < best.cost + _FAR and new and len(separate) < _MOST_MODES:

@@ -50,7 +50,7 @@ def read_container(path: Path) -> Tree:
         DataRefused: it is foreign or cut short, or asks for code to be run.
     """
     require_file(path, "file", "give a published ObjectFile, a .pth file")
-    # Looked at before torch is: a cut file has lost its table of contents, which stands last.
+    # Checked before torch opens it: a truncated file has lost the directory at its end.
     require_readable(path, "an ObjectFile", MOST_DATA)
     with path.open("rb") as stream:
         if stream.read(2) != b"PK":

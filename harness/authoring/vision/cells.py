@@ -92,7 +92,7 @@ class CellTraining:
         """Train the next cells; the mean of their colours' errors, as roots of linear light."""
         first = self.epoch * _AT_ONCE
         cells = range(first, min(first + _AT_ONCE, len(self.grid)))
-        # The compiled training lets threads run beside each other.
+        # The compiled training releases the interpreter lock, so threads run in parallel.
         with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(self.threads) as pool:
             found = list(pool.map(self._teach, cells))
         self.losses += found

@@ -86,7 +86,7 @@ class VisionNetworks:
             self.density_scale: float = held["density_scale"].item()
             kind: Kind = "osf-v" if "extras" in taken else "osf"
             place, wide = held[f"{_WEIGHTS}first"].shape[1:]
-            # ``scatter`` may be whole, as older files have it.
+            # Older files store ``scatter`` in full.
             if f"{_WEIGHTS}scatter" in held:
                 direction = (held[f"{_WEIGHTS}scatter"].shape[1] - wide - EXTRAS[kind]) // 2
             else:

@@ -234,7 +234,7 @@ def number_marks(figure: Figure, axes: Axes, marks: FloatArray, names: Sequence[
         turns = np.pi / 4.0 + 2.0 * np.pi * np.arange(_WAYS) / _WAYS
         ring = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         ways = np.concatenate([reach * ring for reach in _RINGS])
-        # The square pt that are covered twice, much for leaving the frame, and a little for the distance.
+        # Cost: overlap in square pt, a large penalty outside the frame, a small one for the distance.
         prices, others = [], np.array(taken)
         for way in ways:
             box = _box(point + way, wide, high)

@@ -163,7 +163,7 @@ def _bent(
         return np.inf
     sides = float(surface.face_areas.sum()) - 2.0 * volume / wall
     wave = min(bending_wave(material, wall, limit), 4.0 * volume / sides if sides > 0.0 else np.inf)
-    # With this edge, filling flat walls makes about as many unknowns as they may have.
+    # Edge at which flat walls use about their budget of unknowns.
     square = _FLAT_UNKNOWNS * 0.5 * float(surface.face_areas.sum()) / _FLAT_BUDGET
     affordable = float(max(square**0.5, (square * wall**0.5) ** 0.4))
     return float(max(_BENT_UP_TO * np.sqrt(wall * wave), affordable))

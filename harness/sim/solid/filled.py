@@ -72,7 +72,7 @@ def filled(
     begun, worked = time.perf_counter(), time.process_time()
     found = tetrahedralize(mesh, edge, envelope)
     ends = found.nodes[found.cells[:, EDGES]]
-    # Once more where it stopped with edges much longer than asked for.
+    # Fill again if the edges are much longer than requested.
     if float(np.sqrt(((ends[:, :, 0] - ends[:, :, 1]) ** 2).sum(axis=2).mean())) > _LONGER * edge:
         found = tetrahedralize(mesh, edge, envelope, _STRICTER)
     took.wall, took.cpu = time.perf_counter() - begun, time.process_time() - worked

@@ -176,7 +176,7 @@ def struck(
         sound += _heavy(
             frequencies[heavy], dampings[heavy], amplitudes[:, heavy], pulse, rate, sound.shape[1]
         )
-    # What rings on is in error as it says, and the quadratures by what they miss.
+    # Error of the free vibration as stated, plus that of the quadrature.
     peaks = loudest(sound)
     error = decibels(loudest(free.sound) * 10.0 ** (free.error / 20.0) + _MISSED * peaks, peaks)
     return Synthesis(read_only(sound), rate, read_only(~heard), error, time.perf_counter() - begun)

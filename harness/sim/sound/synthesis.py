@@ -95,7 +95,7 @@ def synthesize(
         if direct.any():
             sound += _summed(f[direct], d[direct], parts[:, direct], samples, rate)
     peaks = loudest(sound)
-    # A phase is known to four roundings of its turns, at the time when that tells most.
+    # A phase has an error of four roundings of its cycles, at the time of the largest effect.
     lasting = np.minimum(samples / rate, 1.0 / (np.e * np.maximum(d, 1e-300)))
     phase_errors = np.abs(parts) @ (4.0 * np.finfo(np.float64).eps * np.pi * f * lasting)
     errors += phase_errors + _rounding(parts, peaks, samples, level)
@@ -182,7 +182,7 @@ def _rounding(amplitudes: AnyArray, peaks: FloatArray, samples: int, level: Synt
     whole = np.sqrt(np.sum(sizes**2, axis=1))
     modes = terms = amplitudes.shape[1]
     if level != "exact":
-        # So many parts, at most, are added up in one run: those of a group, and then the groups.
+        # Maximum number of terms in one sum: those of a group, and then the groups.
         terms = min(modes, TOGETHER) + modes / TOGETHER + min(modes / TILE, SPLITS)
     walk = np.sqrt((2.0 + terms) / 3.0) * np.maximum(_SIGMAS * np.sqrt(0.5) * whole, peaks)
     block = _block_length(samples)

@@ -94,7 +94,7 @@ def fill_sound(steps: Steps, weights: AnyArray, sound: FloatArray, level: TableL
     blocks, length = sound.shape
     seconds = length / steps.rate
     counts = _counts(sizes, steps.dampings, seconds, blocks, level)
-    # Modes that hardly die away are summed by their spectrum, if they are many.
+    # Many slowly decaying modes are summed by their spectrum.
     lasting = may_be_added(steps.dampings, blocks * length, steps.rate) & (counts > 0)
     if level != "fast" or blocks * length < _SHORTEST or counts[lasting].sum() < _LASTING * blocks:
         lasting = np.zeros_like(lasting)
