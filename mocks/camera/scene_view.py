@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray, read_only
+from harness.basics.compiled import compiled
 from harness.basics.geometry import apply, inverse
 from harness.basics.mesh import Mesh
 
@@ -65,7 +65,7 @@ class SceneView:
         _paint(corners[in_front], shades[in_front], self._focal_length, colours, closeness)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _paint(
     corners: FloatArray, shades: ByteArray, focal_length: float, colours: ByteArray, closeness: FloatArray
 ) -> None:

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 from scipy.ndimage import map_coordinates
 
 from harness.basics.arrays import ByteArray, FloatArray, IntArray
+from harness.basics.compiled import compiled
 from harness.basics.geometry import translation
 from harness.basics.mesh import Mesh
 from harness.bench.gap import GelGap
@@ -200,7 +200,7 @@ class GelContact:
         return np.maximum(low, 0), np.minimum(high, self._shape - 1)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _fill(low: IntArray, high: IntArray, shape: IntArray) -> tuple[IntArray, IntArray]:
     boxes = shape[0] * shape[1] * shape[2]
     starts = np.zeros(boxes + 1, dtype=np.int64)
@@ -223,7 +223,7 @@ def _fill(low: IntArray, high: IntArray, shape: IntArray) -> tuple[IntArray, Int
     return starts, members
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _rasterize(
     corners: FloatArray,
     starts: IntArray,
