@@ -13,6 +13,8 @@ from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station_file import Station, load_station
 from tests.support.real_data import WHY_NOT, find_shared_data
 
+pytest_plugins = ["tests.support.cpu_limit"]
+
 TESTS: Final = Path(__file__).parent
 ROOT: Final = TESTS.parent
 WIRES: Final = (
@@ -29,7 +31,7 @@ WIRES: Final = (
 """Where processes keep each other's deadlines: one at a time, and before all that only computes."""
 
 # One commit gets one verdict; `make hunt` draws other cases every time.
-# A case's time says how busy the machine is; a test that hangs is ended by its own timeout.
+# A case's duration depends on how busy the machine is; tests/support/cpu_limit.py limits CPU time.
 settings.register_profile("verdict", derandomize=True, deadline=None)
 settings.register_profile("hunt", derandomize=False, print_blob=True, deadline=None)
 settings.load_profile("verdict")

@@ -98,7 +98,6 @@ def test_a_published_file_is_imported(here: Path, monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("line", [line for line in commands() if line.startswith(LONG)])
 def test_a_long_command_answers(line: str, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(here)

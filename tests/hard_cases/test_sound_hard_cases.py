@@ -31,8 +31,6 @@ from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
 from tests.support.localization import dials, estimate
 
-pytestmark = pytest.mark.timeout(300, func_only=True)  # on a cold machine the modes are computed first
-
 SEED, CONTACTS = 1, 6
 
 HARMED = {"silent": 1, "saturated": 2, "double": 3}

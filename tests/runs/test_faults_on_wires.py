@@ -30,7 +30,6 @@ from tests.support.whole_run import copied, edited
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),
-    pytest.mark.timeout(180, func_only=True),  # on a cold machine the first run compiles
 ]
 
 Cue = Callable[[Bench], None]

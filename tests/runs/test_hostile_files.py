@@ -195,7 +195,6 @@ def test_a_sample_of_commands_with_hostile_files(walk: Walk) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("use", USES)
 def test_a_command_with_every_hostile_file(walk: Walk, use: str) -> None:
     for name in NAMES:

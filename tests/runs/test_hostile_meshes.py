@@ -29,7 +29,6 @@ def readings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, ob
     return {line["name"]: line for line in map(json.loads, done.stdout.splitlines())}
 
 
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("name", FILES)
 def test_a_hostile_file_is_refused_in_one_sentence(readings: dict[str, dict[str, object]], name: str) -> None:
     reading = readings[name]

@@ -14,7 +14,6 @@ from tests.support.run_process import RunProcess
 pytestmark = [
     pytest.mark.slow,  # minutes over the wires; kills between steps stay in test_runs_on_wires.py
     pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),
-    pytest.mark.timeout(600, func_only=True),  # on a cold machine modes are computed and kernels compiled
 ]
 
 MUG = (

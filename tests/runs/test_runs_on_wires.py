@@ -20,7 +20,6 @@ from tests.support.run_process import RunProcess
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),
-    pytest.mark.timeout(180, func_only=True),  # on a cold machine the first run compiles
 ]
 
 CONTACTS = 2

@@ -11,7 +11,6 @@ from tests.support.run_process import RunProcess
 pytestmark = [
     pytest.mark.slow,  # the same run in process is in test_run.py of scale estimation
     pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),
-    pytest.mark.timeout(240),
 ]
 
 

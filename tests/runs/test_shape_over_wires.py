@@ -16,7 +16,6 @@ from tests.support.run_process import RunProcess
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),
-    pytest.mark.timeout(600),
 ]
 
 SAME_SURFACE = 0.5e-3

@@ -46,7 +46,6 @@ from tests.support.whole_run import copied, touch_scene
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),
-    pytest.mark.timeout(900),  # on a cold and busy machine the first run compiles
 ]
 
 GAP, SEED = "default", 0

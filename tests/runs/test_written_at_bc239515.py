@@ -47,7 +47,6 @@ def test_a_recorded_scale_estimation_is_answered_as_before(tmp_path: Path) -> No
         assert now[sense]["low90_m"] < found["size_m"] < now[sense]["high90_m"], sense
 
 
-@pytest.mark.timeout(300, func_only=True)  # compiles the family where it is the first to
 def test_a_recorded_shape_reconstruction_is_answered(tmp_path: Path) -> None:
     """Every sense answers; the method has become another one since, so its numbers are not held."""
     before, now = answered("shape", tmp_path / "run", "shape.method=family-coarse")

@@ -82,7 +82,6 @@ def test_it_is_told_that_pictures_were_made_square_and_when_another_aspect_was_t
     assert any("--aspect" in said for said in doubts(scale, run, far))
 
 
-@pytest.mark.timeout(600)
 def test_a_finished_run_is_resumed_without_a_bench(
     done: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -27,8 +27,6 @@ from tests.experiments.paper.test_scale_networks import write_means
 from tests.experiments.scale_estimation.test_sound import NOMINAL, model, peaks_at
 from tests.experiments.scale_estimation.test_vision import nominal, outline_at, view_of
 
-pytestmark = pytest.mark.timeout(300)  # fills a mug with elements where it is the first to
-
 RANGE = SizeRange(0.05, 0.2)
 
 

@@ -27,8 +27,6 @@ from tests.experiments.scale_estimation.runs import (
     went_on,
 )
 
-pytestmark = pytest.mark.timeout(300)  # explores objects, and fills one with elements
-
 
 @pytest.mark.parametrize("mesh", ["builtin:mug", "builtin:wrench"])
 @pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (3, 4))])

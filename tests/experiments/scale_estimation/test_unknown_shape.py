@@ -23,8 +23,6 @@ from harness.skills.strike import POSE
 from harness.twin.rehearsal import rehearse
 from tests.experiments.scale_estimation.runs import answering_of, outside, ran, scene_of, travels, true_mesh
 
-pytestmark = pytest.mark.timeout(300)  # explores an object, and fills one with elements
-
 MOST = 10
 
 

@@ -54,7 +54,6 @@ def test_a_press_that_needs_likely_shapes_waits_for_them() -> None:
     assert live_method("random") == live_method("planned") == QUICK
 
 
-@pytest.mark.timeout(300, func_only=True)  # compiles the family where it is the first to
 def test_what_goes_on_from_press_to_press_is_the_same_where_a_run_is_taken_up_again() -> None:
     """Which estimates were asked for on the way changes none of them."""
     evidence = evidence_of(TOUCHES[:3])

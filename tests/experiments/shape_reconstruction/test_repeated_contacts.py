@@ -74,7 +74,6 @@ def test_the_same_touch_ten_times_changes_no_answer(method: str) -> None:
     np.testing.assert_allclose(ten.deviation, once.deviation, atol=1e-9)
 
 
-@pytest.mark.timeout(300, func_only=True)  # compiles the family where it is the first to
 def test_repeated_contacts_do_not_test_the_family() -> None:
     """Ten presses at three places: the household shape is still an assumption, and no surer."""
     found = estimated("family-coarse", repeated(ONCE, 9))

@@ -43,8 +43,6 @@ from tests.experiments.shape_reconstruction.runs import (
 )
 from tests.support.whole_run import with_spoiled_pictures
 
-pytestmark = pytest.mark.timeout(300)  # explores objects press by press
-
 
 @pytest.fixture(scope="module")
 def touched(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Recording:

@@ -116,7 +116,6 @@ def test_bytes_after_the_end_of_a_step_are_noticed(run: Recording) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1200)
 def test_no_damage_to_a_real_step_passes(tmp_path: Path) -> None:
     recording = in_process_run(tmp_path / "run", touch_scene(contacts=1), seed=0)
     data = (recording.folder / "steps" / "000.mcap").read_bytes()

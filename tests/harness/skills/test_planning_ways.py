@@ -19,8 +19,6 @@ from harness.skills.planning import HOME, Itinerary, RunPlan
 from harness.skills.sites import SHORTEST_STEP
 from harness.twin.rehearsal import rehearse
 
-pytestmark = pytest.mark.timeout(240)  # on a cold machine the first plan compiles
-
 STATION = load_station(station_path("mock"))
 
 

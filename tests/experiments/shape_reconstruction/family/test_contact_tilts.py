@@ -14,8 +14,6 @@ from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, rotation_from_vector, transform
 from tests.support.shape_readings import SIGMA, shape_readings
 
-pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
-
 ANGLE = np.radians(15.0)
 
 

@@ -29,8 +29,6 @@ from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
 from tests.support.shape_readings import look_at, shape_readings, touch_at, touches_on
 
-pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
-
 COARSE = replace(LEVELS["coarse"], draws=210)
 
 

@@ -45,7 +45,6 @@ def holes_and_pieces(mesh: Mesh) -> int:
     return len(np.unique(mesh.faces)) - len(np.unique(edges, axis=0)) + len(mesh.faces)
 
 
-@pytest.mark.timeout(300)  # compiles the family where it is the first to
 @pytest.mark.parametrize("wall", [0.4e-3, 1.0e-3, 1.5e-3, 3.0e-3])
 def test_a_thin_wall_has_no_holes_and_its_outside_is_where_it_was(wall: float) -> None:
     shape = cup_with(wall)
@@ -54,7 +53,6 @@ def test_a_thin_wall_has_no_holes_and_its_outside_is_where_it_was(wall: float) -
     assert mesh.bounds[1, 2] == pytest.approx(corners_of(shape)[:, 2].max(), abs=1.5e-3)
 
 
-@pytest.mark.timeout(300)
 def test_the_grid_is_fine_enough_for_a_wall_of_a_millimetre_and_a_half() -> None:
     coarse, fine = (volume(surface_of(cup_with(1.5e-3), pitch)) for pitch in (2.5e-3, 0.9e-3))
     assert coarse == pytest.approx(fine, rel=0.1)
@@ -65,7 +63,6 @@ def volume(mesh: Mesh) -> float:
     return float(np.einsum("ni,ni->n", a, np.cross(b, c)).sum() / 6.0)
 
 
-@pytest.mark.timeout(300)
 def test_bodies_that_lie_apart_are_answered_by_the_likeliest() -> None:
     apart = [board_at(x, 6e-3) for x in (0.0, 0.05, 0.1)]
     mesh = median_surface(mixture_of_all(*apart), 2.5e-3).mesh
@@ -73,7 +70,6 @@ def test_bodies_that_lie_apart_are_answered_by_the_likeliest() -> None:
     assert mesh.bounds[0, 0] < 0.0
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("thick", [2.0e-3, 3.0e-3])
 def test_a_thin_board_is_whole_however_it_is_turned_on_the_grid(thick: float) -> None:
     for yaw in (0.0, 0.02, 0.5):
@@ -85,13 +81,11 @@ def test_a_thin_board_is_whole_however_it_is_turned_on_the_grid(thick: float) ->
         assert np.ptp(mesh.bounds, axis=0) == pytest.approx(np.ptp(corners, axis=0), abs=4e-3)
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("thick", [0.05e-3, 0.4e-3, 1.5e-3])
 def test_a_body_thinner_than_the_grid_has_a_surface(thick: float) -> None:
     assert volume(surface_of(board_at(0.0, thick), 4e-3)) > 0.0
 
 
-@pytest.mark.timeout(300)
 def test_no_surface_goes_on_below_the_support() -> None:
     pot = draw_shape("teapot", np.random.default_rng(0))
     theta = pot.theta.copy()
@@ -105,7 +99,6 @@ def test_no_surface_goes_on_below_the_support() -> None:
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
 
 
-@pytest.mark.timeout(300)
 def test_a_body_that_stands_on_the_support_is_as_it_is() -> None:
     shape = cup_with(3.0e-3)
     theta = shape.theta.copy()

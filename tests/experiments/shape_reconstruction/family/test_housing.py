@@ -24,8 +24,6 @@ from harness.basics.geometry import frame_facing
 from tests.support.family_readings import ended_at
 from tests.support.family_shapes import SHAPES, drawn, surface_of
 
-pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
-
 
 def faces_around(middle: FloatArray, count: int, seed: int) -> list[FloatArray]:
     """Rectangles of a housing's size anywhere near a place."""

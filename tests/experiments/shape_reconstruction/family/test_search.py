@@ -28,8 +28,6 @@ from tests.support.family_readings import made, nudged
 from tests.support.family_shapes import SHAPES
 from tests.support.shape_readings import missed, shape_readings
 
-pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
-
 
 def cost_of(shape: FamilyShape, seen: FamilyEvidence, robust: bool = True) -> float:
     return float(evaluate(shape.code, shape.theta, seen, robust, rows_for(seen), prepared_room()))

@@ -28,8 +28,6 @@ from experiments.shape_reconstruction.family.residuals import (
 from tests.support.family_readings import ended_at, made, nudged
 from tests.support.family_shapes import SHAPES
 
-pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
-
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: str) -> None:

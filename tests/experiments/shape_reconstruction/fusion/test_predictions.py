@@ -53,7 +53,6 @@ def test_the_outline_may_be_off_by_the_camera_s_error() -> None:
     assert outline_error(moved(MUG, 6e-3), rough) < 0.01
 
 
-@pytest.mark.timeout(300, func_only=True)  # compiles the family where it is the first to
 def test_a_right_family_predicts_contacts_and_a_slipped_one_is_off_by_its_slip() -> None:
     found = family_estimate(READINGS, LEVELS["coarse"])
     assert np.median(predict_left_out(found, READINGS)) < 1.5e-3

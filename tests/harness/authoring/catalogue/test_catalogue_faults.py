@@ -33,7 +33,6 @@ def build(path: Path, out: Path, *more: str) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_a_killed_driver_loses_nothing_and_nothing_is_built_twice(tmp_path: Path) -> None:
     path, out = catalogue(tmp_path, 4), tmp_path / "built"
     with subprocess.Popen(build(path, out, "--workers", "2"), stderr=subprocess.DEVNULL) as driver:
@@ -51,7 +50,6 @@ def test_a_killed_driver_loses_nothing_and_nothing_is_built_twice(tmp_path: Path
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(400)
 @pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed: the extra cluster")
 def test_ray_builds_the_same_bytes(tmp_path: Path) -> None:
     path, out = catalogue(tmp_path, 2), tmp_path / "built"

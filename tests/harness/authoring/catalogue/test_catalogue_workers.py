@@ -56,7 +56,6 @@ def test_a_folder_that_a_node_does_not_see_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(400)
 def test_a_mesher_that_hangs_or_eats_all_memory_does_not_stop_the_others(tmp_path: Path) -> None:
     of = BuildFolder(tmp_path / "out")
     jobs = [tiny_job(tmp_path, "heavy", of, FINE), tiny_job(tmp_path, "block", of)]
