@@ -5,9 +5,9 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from itertools import count
+from itertools import count, islice, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,9 +21,11 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.table import Table
 
 from harness.basics.answers import write_answer
 from harness.basics.errors import TouchstoneError
+from harness.basics.result import Result
 from harness.commands.terminal import SafeConsole, escape_message
 
 if TYPE_CHECKING:
@@ -42,12 +44,43 @@ _REPEAT = 1.0
 _DIGITS = re.compile(r"[\d.]+")
 """What changes in what is being done without another stage beginning."""
 
+MAX_ROWS = 40
+"""Rows of a table in text."""
+
 ANSWERS = SafeConsole(width=None if sys.stdout.isatty() else WIDE)
 
 
 def emit(result: Mapping[str, Any]) -> None:
     """Print the one JSON object of a command, at once: some go on until they are told to end."""
     write_answer(json.dumps(result, allow_nan=False))
+
+
+def print_result(result: Result, as_json: bool) -> None:
+    """Print a result: notes on standard error, then JSON or text on standard output.
+
+    Text is the answer in words, a table of the vectors, and every other field with its unit.
+    """
+    notes: Sequence[str] = getattr(result, "notes", ())
+    for sentence in notes:
+        warn(sentence)
+    if as_json:
+        emit(result.as_json())
+        return
+    for sentence in result.summary():
+        ANSWERS.print(sentence, markup=False)
+    columns = result.columns()
+    if columns:
+        table = Table(*columns)
+        length = max(map(len, columns.values()))
+        for cells in islice(zip_longest(*columns.values(), fillvalue=""), MAX_ROWS):
+            table.add_row(*cells)
+        ANSWERS.print(table)
+        if length > MAX_ROWS:
+            ANSWERS.print(f"... and {length - MAX_ROWS} more rows; --json has all")
+    grid = Table.grid(padding=(0, 2))
+    for label, value in result.rows():
+        grid.add_row(escape(label), escape(value))
+    ANSWERS.print(grid)
 
 
 def warn(sentence: str) -> None:

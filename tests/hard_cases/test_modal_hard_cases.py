@@ -130,7 +130,7 @@ def test_two_blocks_in_a_file_are_two_bodies(block: tuple[Path, Mesh]) -> None:
     found = modes_of_file(stored(folder, "two.vtu", both, faces), STEEL, "mm", count=4, edge=25e-3)
     assert found.bodies == 2
     assert found.solution.modes.rigid == 12
-    assert any("pieces" in sentence for sentence in found.said)
+    assert any("pieces" in sentence for sentence in found.notes)
 
 
 def test_a_layer_of_cubes_of_any_size_is_one_body() -> None:

@@ -159,7 +159,7 @@ def _of_volume(wanted: AudioRequest, begin: Begin) -> tuple[Mesh, Modes, tuple[s
         up_axis=wanted.up_axis,
     )
     modes = solved.solution.modes
-    return Mesh(modes.points, modes.faces), modes, solved.said
+    return Mesh(modes.points, modes.faces), modes, solved.notes
 
 
 def _lowest(modes: Modes, most: int) -> Modes:

@@ -1,20 +1,16 @@
 """``touchstone sim``: what the simulators compute, one at a time."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 
 from harness.commands import options
-from harness.commands.output import ANSWERS, emit, warn
+from harness.commands.output import print_result
 
 if TYPE_CHECKING:
     from harness.basics.materials import Material
     from harness.basics.quantities import Dimension
-    from harness.sim.modal.file import FileModes
 
-_SHOWN = 40
 _SI_OR_UNIT = "a number in SI units, or with its unit"
 
 
@@ -85,34 +81,26 @@ def modes(
 
     Try: touchstone sim modes plate.inp --material steel --units mm --modes 20
     """
+    from harness import api
     from harness.basics.quantities import FREQUENCY, LENGTH
-    from harness.basics.store import Store, default_folder
     from harness.objects.builtin import BUILTIN, MATERIALS
-    from harness.sim.modal.file import modes_of_file
 
     if not material:
-        # One of our own objects is of its own material; a file states none.
+        # A built-in object is of its own material; a file states none.
         material = MATERIALS.get(mesh.removeprefix(BUILTIN)) if mesh.startswith(BUILTIN) else None
-    of = _material(material, young, poisson, density, alpha, beta)
-    found = modes_of_file(
+    found = api.modes(
         mesh,
-        of,
+        _material(material, young, poisson, density, alpha, beta),
         units,
-        wall=options.quantity("--wall", wall, LENGTH),
-        limit=_in_si("--up-to", up_to, FREQUENCY),
+        up_to=_in_si("--up-to", up_to, FREQUENCY),
         count=count,
         edge=options.quantity("--edge", edge, LENGTH),
+        up_axis=up_axis,
+        wall=options.quantity("--wall", wall, LENGTH),
         envelope=options.quantity("--envelope", envelope, LENGTH),
         fixed=fixed or (),
-        up_axis=up_axis,
-        store=Store(default_folder()),
     )
-    if not json:
-        for sentence in found.said:
-            warn(sentence)
-        _print(Path(mesh).name, found, of, count)
-        return 0
-    emit(_as_json(Path(mesh).name, found, of, count))
+    print_result(found, json)
     return 0
 
 
@@ -160,67 +148,3 @@ def _in_si(option: str, text: str | None, kind: "Dimension") -> float | None:
         return None if text is None else float(text)
     except ValueError:
         return options.quantity(option, text, kind)
-
-
-def _listed(found: "FileModes", count: int | None) -> Any:
-    """Hz: as many as were asked for; what came with the last ones is counted but not listed."""
-    return found.solution.modes.frequencies[:count]
-
-
-def _as_json(name: str, found: "FileModes", of: "Material", count: int | None) -> dict[str, Any]:
-    from harness.sim.modal.modes import dampings
-
-    modes_, listed = found.solution.modes, _listed(found, count)
-    finite = modes_.limit < float("inf")
-    return {
-        "schema": 1,
-        "mesh": name,
-        "material": dict(vars(of)),
-        "units": found.units,
-        "volume_mesh": found.volume,
-        "frequencies_hz": listed.tolist(),
-        "dampings_per_s": dampings(listed, of).tolist(),
-        "rigid_modes": modes_.rigid,
-        "unknowns": found.solution.unknowns,
-        "nodes": modes_.nodes,
-        "elements": modes_.elements,
-        "bodies": found.bodies,
-        "held_nodes": found.held,
-        "edge_m": found.edge,
-        "mass_kg": modes_.mass,
-        "complete_below_hz": modes_.limit if finite else None,
-        "modes_below": len(modes_.frequencies),
-        "certified": found.solution.certified,
-        "residual": modes_.residual,
-        "seconds": dict(found.seconds),
-        "notes": list(found.said),
-    }
-
-
-def _print(name: str, found: "FileModes", of: "Material", count: int | None) -> None:
-    from harness.sim.modal.modes import dampings
-
-    modes_, listed = found.solution.modes, _listed(found, count)
-    drawn = Table(title=f"{name}: {of.name}, {modes_.mass:.4g} kg")
-    for heading in ("mode", "Hz", "damping 1/s", "falls by 60 dB in s"):
-        drawn.add_column(heading, justify="right")
-    rates = dampings(listed, of)
-    for row, (frequency, rate) in enumerate(zip(listed[:_SHOWN], rates, strict=False)):
-        quiet = f"{6.9078 / rate:.3g}" if rate > 0.0 else "never"
-        drawn.add_row(str(row + 1), f"{frequency:.6g}", f"{rate:.4g}", quiet)
-    ANSWERS.print(drawn)
-    if len(listed) > _SHOWN:
-        ANSWERS.print(f"... and {len(listed) - _SHOWN} more up to {listed[-1]:.6g} Hz; --json lists all")
-    below = f"below {modes_.limit:.6g} Hz" if modes_.limit < float("inf") else "in all"
-    number = f"{len(modes_.frequencies)} modes {below}"
-    if found.solution.certified:
-        ANSWERS.print(f"certified: exactly {number}, counted by the inertia of the system")
-    else:
-        ANSWERS.print(f"not certified: {number} were found, but the factors do not say whether all")
-    held = f"{found.held} nodes held, " if found.held else ""
-    kind = "its own nodes" if found.volume else f"tetrahedra of {1e3 * (found.edge or 0.0):.3g} mm"
-    ANSWERS.print(
-        f"{modes_.elements} elements, {found.solution.unknowns} unknowns on {kind}; {held}{modes_.rigid} "
-        f"rigid motions left out ({found.bodies} {'body' if found.bodies == 1 else 'bodies'})"
-    )
-    ANSWERS.print(", ".join(f"{stage} {took:.2f} s" for stage, took in found.seconds.items()))

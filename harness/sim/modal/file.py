@@ -3,19 +3,21 @@
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from harness.basics.arrays import BoolArray, IntArray
+from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.errors import WrongUse
 from harness.basics.files.named_file import nearest
 from harness.basics.materials import Material
+from harness.basics.result import HIDDEN, Result
 from harness.basics.store import Store
 from harness.objects.builtin import BUILTIN
 from harness.sim.modal.element_edge import finely_filled
 from harness.sim.modal.modal import HEARING, curved
+from harness.sim.modal.modes import dampings
 from harness.sim.modal.solve import Elasticity, Solution, check_elasticity, check_limit, solve_mesh
 from harness.sim.modal.stage_seconds import Begin, ignore_stage
 from harness.sim.solid.filled import filled
@@ -36,17 +38,40 @@ _SIDES = {f"{axis}-{end}": (number, end) for number, axis in enumerate("xyz") fo
 
 
 @dataclass(frozen=True, eq=False)
-class FileModes:
-    """The modes of a mesh, and how they came about."""
+class FileModes(Result):
+    """The modes of a mesh: frequencies and dampings, lowest first, and the model that they were solved on."""
 
-    solution: Solution  #: the modes.
-    volume: bool  #: whether the file held tetrahedra.
-    units: str  #: the unit that the file's numbers were taken in; metres of a built-in object.
-    bodies: int  #: separate ones.
-    edge: float | None  #: m, longest edge of an element aimed at; None for a volume mesh.
-    held: int  #: nodes that are held.
+    mesh: str  #: name of the file, or ``builtin:`` and a name.
+    material: Material  #: of the whole object.
+    units: str  #: unit of the file's coordinates; metres for a built-in object.
+    volume_mesh: bool  #: whether the file held tetrahedra.
+    frequencies_hz: FloatArray  #: ``(n,)`` of the undamped object.
+    dampings_per_s: FloatArray  #: ``(n,)`` decay rates d: each mode decays as exp(-d t).
+    rigid_modes: int  #: motions without deformation, which are left out.
+    unknowns: int  #: degrees of freedom of the linear system.
+    nodes: int  #: of the tetrahedra.
+    elements: int  #: tetrahedra of ten nodes.
+    bodies: int  #: separate bodies.
+    held_nodes: int  #: nodes with a displacement that is fixed.
+    edge_m: float | None  #: longest edge of an element aimed at; None for a volume mesh.
+    mass_kg: float
+    complete_below_hz: (
+        float | None
+    )  #: every mode below is in ``solution``; None where only a number was given.
+    modes_below: int  #: modes of ``solution``.
+    certified: bool  #: whether the inertia of the system proves that none is missing.
+    residual: float  #: largest relative residual of a mode.
     seconds: Mapping[str, float]  #: of ``"intake"``, ``"mesh"``, ``"assemble"`` and ``"solve"``.
-    said: tuple[str, ...]  #: what was done to the mesh and what to look at, a sentence each.
+    notes: tuple[str, ...]  #: changes made to the mesh and warnings, a sentence each.
+    solution: Solution = field(metadata=HIDDEN)  #: all modes, with their shapes.
+
+    def summary(self) -> tuple[str, ...]:
+        """State how many modes there are and whether that is certain."""
+        below = "in all" if self.complete_below_hz is None else f"below {self.complete_below_hz:.6g} Hz"
+        number = f"{self.modes_below} modes {below}"
+        if self.certified:
+            return (f"certified: exactly {number}, counted by the inertia of the system",)
+        return (f"not certified: {number} were found, but the factors do not show whether any is missing",)
 
 
 @dataclass(frozen=True)
@@ -124,16 +149,31 @@ def modes_of_file(
     held = _held(taken, fixed)
     below = np.inf if limit is None and count is not None else highest
     solution = solve_mesh(taken.mesh, material, below, least=count, held=held, begin=begin)
-    spent = solution.modes.seconds
+    modes = solution.modes
+    # More than the modes that were asked for may come with the last ones.
+    frequencies = modes.frequencies[:count]
     return FileModes(
-        solution=solution,
-        volume=volume,
+        mesh=asked.mesh if asked.mesh.startswith(BUILTIN) else Path(asked.mesh).name,
+        material=material,
         units=taken.units,
+        volume_mesh=volume,
+        frequencies_hz=frequencies,
+        dampings_per_s=dampings(frequencies, material),
+        rigid_modes=modes.rigid,
+        unknowns=solution.unknowns,
+        nodes=modes.nodes,
+        elements=modes.elements,
         bodies=taken.bodies,
-        edge=taken.edge,
-        held=int(held.any(axis=1).sum()),
-        seconds={**seconds, "assemble": spent["assembly"], "solve": spent["solve"]},
-        said=taken.said,
+        held_nodes=int(held.any(axis=1).sum()),
+        edge_m=taken.edge,
+        mass_kg=modes.mass,
+        complete_below_hz=modes.limit if np.isfinite(modes.limit) else None,
+        modes_below=len(modes.frequencies),
+        certified=solution.certified,
+        residual=modes.residual,
+        seconds={**seconds, "assemble": modes.seconds["assembly"], "solve": modes.seconds["solve"]},
+        notes=taken.said,
+        solution=solution,
     )
 
 

@@ -59,8 +59,8 @@ def test_ten_node_cells_of_any_format_are_solved_as_they_are(
     kind = "gmsh" if name.endswith("msh") else None
     file = written(tmp_path / name, mesh.nodes * 1e3, mesh.cells, file_format=kind)
     found = modes_of_file(file, STEEL, "mm", count=6)
-    assert found.volume
-    assert len(found.said) == 1, "nothing but what was read"
+    assert found.volume_mesh
+    assert len(found.notes) == 1, "nothing but what was read"
     assert found.solution.certified
     assert found.solution.unknowns == 3 * len(mesh.nodes)
     assert found.solution.modes.frequencies == pytest.approx(reference, rel=1e-8)
@@ -85,7 +85,7 @@ def test_abaqus_input_as_its_manual_writes_it(tmp_path: Path) -> None:
 def test_four_node_cells_gain_middle_nodes_and_say_so(tmp_path: Path, reference: FloatArray) -> None:
     plain = box(SIDES, (4, 1, 1))
     found = modes_of_file(written(tmp_path / "bar.vtu", plain.nodes, plain.cells), STEEL, "m", count=6)
-    assert any("middle nodes" in sentence for sentence in found.said)
+    assert any("middle nodes" in sentence for sentence in found.notes)
     assert found.solution.modes.frequencies == pytest.approx(reference, rel=1e-9)
 
 
@@ -94,7 +94,7 @@ def test_middle_nodes_in_another_order_are_put_in_order(tmp_path: Path, referenc
     mesh = bar()
     other = mesh.cells[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]]
     found = modes_of_file(written(tmp_path / "bar.vtu", mesh.nodes, other), STEEL, "m", count=6)
-    assert any("5 6 7 8 10 9" in sentence for sentence in found.said)
+    assert any("5 6 7 8 10 9" in sentence for sentence in found.notes)
     assert found.solution.modes.frequencies == pytest.approx(reference, rel=1e-9)
 
 
@@ -116,7 +116,7 @@ def test_cells_numbered_the_other_way_round_are_turned(
     cells[::3] = cells[::3][:, mirrored]
     nodes = mesh.nodes[: cells.max() + 1]
     found = modes_of_file(written(tmp_path / "bar.vtu", nodes, cells), STEEL, "m", count=6)
-    assert any("8 elements " in sentence for sentence in found.said)
+    assert any("8 elements " in sentence for sentence in found.notes)
     assert found.solution.modes.frequencies == pytest.approx(reference, rel=1e-9)
     everywhere = read(written(tmp_path / "all.vtu", nodes, mesh.cells[:, :corners][:, mirrored]))
     assert not any("other way round" in sentence for sentence in everywhere.said)
@@ -126,7 +126,7 @@ def test_nodes_that_no_element_holds_are_left_out_and_said(tmp_path: Path, refer
     mesh = bar()
     nodes = np.concatenate([[[9.0, 9.0, 9.0]], mesh.nodes, [[np.nan] * 3]])
     found = modes_of_file(written(tmp_path / "bar.vtu", nodes, mesh.cells + 1), STEEL, "m", count=6)
-    assert "2 nodes that no element holds are left out" in found.said
+    assert "2 nodes that no element holds are left out" in found.notes
     assert found.solution.modes.frequencies == pytest.approx(reference, rel=1e-9)
 
 
@@ -173,7 +173,7 @@ def test_two_bodies_have_twelve_rigid_motions(tmp_path: Path, reference: FloatAr
     assert found.bodies == 2
     assert found.solution.modes.rigid == 12
     assert found.solution.modes.frequencies[:12] == pytest.approx(np.repeat(reference[:6], 2), rel=1e-8)
-    assert any("coincide" in sentence for sentence in found.said)
+    assert any("coincide" in sentence for sentence in found.notes)
 
 
 def test_parts_that_meet_at_an_edge_are_said_to_turn(tmp_path: Path) -> None:
@@ -235,7 +235,7 @@ def test_a_set_of_nodes_or_a_side_can_be_held(tmp_path: Path) -> None:
     file = written(tmp_path / "held.inp", mesh.nodes, mesh.cells, {"ROOT": root})
     by_set = modes_of_file(file, STEEL, "m", count=3, fixed=["ROOT"])
     by_side = modes_of_file(file, STEEL, "m", count=3, fixed=["x-min"])
-    assert by_set.held == by_side.held == len(root)
+    assert by_set.held_nodes == by_side.held_nodes == len(root)
     assert by_set.solution.modes.rigid == 0
     assert by_set.solution.modes.frequencies == pytest.approx(by_side.solution.modes.frequencies)
     rolling = modes_of_file(file, STEEL, "m", count=3, fixed=["z-min:z"])

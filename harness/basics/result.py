@@ -1,0 +1,133 @@
+"""Results of the API as JSON values and as text, both generated from the fields of a dataclass.
+
+The names of the fields are the JSON keys, with the unit as a suffix (``edge_m``, ``frequencies_hz``). Text
+gives every field with a name and a unit that people use: ``edge_m = 0.004`` is printed as ``edge 4 mm``.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+
+JsonValue: TypeAlias = bool | int | float | str | list["JsonValue"] | dict[str, "JsonValue"] | None
+
+_UNITS = {
+    "_per_s": (1.0, "1/s"),
+    "_share": (100.0, "%"),
+    "_rad": (180.0 / math.pi, "deg"),
+    "_hz": (1.0, "Hz"),
+    "_kg": (1.0, "kg"),
+    "_db": (1.0, "dB"),
+    "_pa": (1.0, "Pa"),
+    "_m2": (1e6, "mm2"),
+    "_m3": (1e6, "cm3"),
+    "_m": (1e3, "mm"),
+    "_n": (1.0, "N"),
+    "_s": (1.0, "s"),
+}
+"""Suffix of a field to the factor and the unit of its text."""
+
+HIDDEN: Mapping[str, bool] = {"text": False, "json": False}
+"""Metadata of a field that is for Python alone: arrays of pixels, objects to compute with."""
+
+JSON_ONLY: Mapping[str, bool] = {"text": False}
+"""Metadata of a field that text leaves out, as the summary has its content."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A result of the API; subclasses are frozen dataclasses that declare its fields."""
+
+    schema: ClassVar[int] = 1  #: of the JSON object; raised when a key changes its meaning.
+
+    def summary(self) -> Sequence[str]:
+        """Return the answer in words, a sentence each."""
+        return ()
+
+    def as_json(self) -> dict[str, JsonValue]:
+        """Return the fields as JSON values; a number that is not finite is None."""
+        return {"schema": self.schema, **_object(self)}
+
+    def columns(self) -> dict[str, list[str]]:
+        """Return the vectors of equal length as columns of text, by heading with unit."""
+        vectors = {
+            name: value for name, value in self._shown() if isinstance(value, np.ndarray) and value.ndim == 1
+        }
+        return {
+            " ".join(filter(None, heading(name))): [number_text(name, item) for item in value]
+            for name, value in vectors.items()
+        }
+
+    def rows(self) -> Iterator[tuple[str, str]]:
+        """Yield label and value of every other field that text shows."""
+        for name, value in self._shown():
+            if value is not None and not isinstance(value, np.ndarray) and name != "notes":
+                yield heading(name)[0], _text(name, value)
+
+    def _shown(self) -> Iterator[tuple[str, Any]]:
+        for item in fields(self):
+            if item.metadata.get("text", True):
+                yield item.name, vars(self)[item.name]
+
+
+def heading(name: str) -> tuple[str, str]:
+    """Return the label and the unit of a field: ``"edge_m"`` is ``("edge", "mm")``."""
+    for suffix, (_, unit) in _UNITS.items():
+        if name.endswith(suffix):
+            return name.removesuffix(suffix).replace("_", " "), unit
+    return name.replace("_", " "), ""
+
+
+def number_text(name: str, value: float) -> str:
+    """Format a number of a field in the unit of its text, without the unit."""
+    factor = next((factor for suffix, (factor, _) in _UNITS.items() if name.endswith(suffix)), 1.0)
+    return f"{value * factor:.5g}" if math.isfinite(value) else "none"
+
+
+def _text(name: str, value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float | np.number):
+        return " ".join(filter(None, (number_text(name, float(value)), heading(name)[1])))
+    if isinstance(value, Mapping):
+        # Times by stage have no suffix of their own.
+        unit = "_s" if name.startswith("seconds") else ""
+        return ", ".join(
+            f"{' '.join(heading(key)[:1])} {_text(key + unit, item)}" for key, item in value.items()
+        )
+    if is_dataclass(value) and not isinstance(value, type):
+        return _text(name, {item.name: vars(value)[item.name] for item in fields(value)})
+    if isinstance(value, tuple | list):
+        return ", ".join(_text(name, item) for item in value)
+    return str(value)
+
+
+def _object(value: Any) -> dict[str, JsonValue]:
+    kept = (item.name for item in fields(value) if item.metadata.get("json", True))
+    return {name: json_value(vars(value)[name]) for name in kept}
+
+
+def json_value(value: object) -> JsonValue:
+    """Convert a value of a result to JSON values.
+
+    Raises:
+        TypeError: there is no JSON for it.
+    """
+    if isinstance(value, np.ndarray | np.generic):
+        return json_value(value.tolist())
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {str(key): json_value(item) for key, item in value.items()}
+    if isinstance(value, tuple | list):
+        return [json_value(item) for item in value]
+    if is_dataclass(value) and not isinstance(value, type):
+        return _object(value)
+    raise TypeError(f"no JSON for a {type(value).__name__}")
