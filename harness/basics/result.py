@@ -26,6 +26,7 @@ _UNITS = {
     "_m3": (1e6, "cm3"),
     "_m": (1e3, "mm"),
     "_n": (1.0, "N"),
+    "_ns": (1.0, "N s"),
     "_s": (1.0, "s"),
 }
 """Suffix of a field to the factor and the unit of its text."""
@@ -90,7 +91,9 @@ def number_text(name: str, value: float) -> str:
 def _text(name: str, value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, int | float | np.number):
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float | np.number):
         return " ".join(filter(None, (number_text(name, float(value)), heading(name)[1])))
     if isinstance(value, Mapping):
         # Times by stage have no suffix of their own.

@@ -25,10 +25,10 @@ from rich.table import Table
 
 from harness.basics.answers import write_answer
 from harness.basics.errors import TouchstoneError
-from harness.basics.result import Result
 from harness.commands.terminal import SafeConsole, escape_message
 
 if TYPE_CHECKING:
+    from harness.basics.result import Result
     from harness.recording.step_file import Step
 
 WIDE = 132
@@ -55,7 +55,7 @@ def emit(result: Mapping[str, Any]) -> None:
     write_answer(json.dumps(result, allow_nan=False))
 
 
-def print_result(result: Result, as_json: bool) -> None:
+def print_result(result: "Result", as_json: bool) -> None:
     """Print a result: notes on standard error, then JSON or text on standard output.
 
     Text is the answer in words, a table of the vectors, and every other field with its unit.

@@ -12,7 +12,7 @@ import numpy as np
 from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.files.named_file import nearest
-from harness.basics.robust_fit import TUKEY, robust_fit, scatter
+from harness.picture.robust_fit import TUKEY, robust_fit, scatter
 from harness.picture.srgb import LINEAR_OF_BYTE
 
 BLOCK = 16

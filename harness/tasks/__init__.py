@@ -1,0 +1,1 @@
+"""What the API computes, one module per task."""

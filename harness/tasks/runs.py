@@ -1,0 +1,33 @@
+"""Recorded runs."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from harness.experiment.answer import common, score
+from harness.experiment.levels import chosen_levels
+from harness.experiment.lookup import experiment_of
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+
+
+def answer(run: str | Path, levels: Sequence[str] = ()) -> dict[str, Any]:
+    """What a recorded run says; no bench is opened and nothing is written.
+
+    Args:
+        run: its folder.
+        levels: dials turned from their defaults, ``"localization.method=particle"``.
+
+    Returns:
+        The result as ``result.json`` has it, without the report.
+
+    Raises:
+        WrongUse: no run, a calibration's run, or an unknown dial.
+        RecordingDamaged: a step or a file of it is not what was recorded.
+        FitRefused: nothing explains the readings.
+    """
+    recording = Recording(Path(run))
+    experiment = experiment_of(recording)
+    accuracy = chosen_levels(experiment.knobs, levels, RunFiles(recording).network_levels)
+    scored = score(experiment, recording, accuracy)
+    return {**common(experiment, scored), **scored.result}

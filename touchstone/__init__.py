@@ -1,0 +1,23 @@
+"""Touchstone from Python: ``import touchstone``. The functions are those of ``harness.api``.
+
+This is the one ``__init__`` with code: it hands on names without importing what defines them.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from harness import api
+
+if TYPE_CHECKING:
+    from harness.api import RenderedAudio, answer, modes, render_audio, tactile_image
+
+__all__ = ["RenderedAudio", "answer", "modes", "render_audio", "tactile_image"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(api, name)
+
+
+def __dir__() -> list[str]:
+    return __all__
