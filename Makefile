@@ -11,7 +11,7 @@ SOUND := pipewire wireplumber pipewire-alsa libportaudio2
 # Objects of ours and what each is made of.
 OBJECTS := mug:ceramic bowl:ceramic plate:ceramic pitcher:polycarbonate tray:wood wrench:steel
 
-.PHONY: help install demo demo-shape objectfiles test slow hunt lint types contracts reference bench tables sound clean
+.PHONY: help install demo demo-shape objectfiles test slow hunt lint types contracts reference results bench tables sound clean
 
 help: ## what can be asked for
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -75,6 +75,9 @@ contracts: $(DEV)
 
 reference: $(DEV) ## docs/reference, from the models and the tables
 	@$(BIN)/python -m tests.docs.reference
+
+results: $(DEV) ## docs/results, from the JSON in docs/results/data
+	@$(BIN)/python -m tests.docs.results
 
 bench: $(DEV) ## timings with their spread, beside the peers
 	@$(BIN)/python -m pytest -m benchmark -s

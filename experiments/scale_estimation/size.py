@@ -35,7 +35,7 @@ without it 88 %."""
 
 UNEVEN_EXCESS = 0.15e-3
 """Mean in m by which a made object's longest side exceeds that of its CAD model at the same scale: the side
-ends at the highest points of an uneven surface (docs/results/scale.md)."""
+ends at the highest points of an uneven surface."""
 
 UNEVEN_SIGMA = 0.35e-3
 """Standard deviation in m of that excess: a quarter of a millimetre at each end."""

@@ -6,16 +6,14 @@ the check that it belongs to the surface. OBJECT is a folder, or the name of one
 Loading the programs is timed before; a run does both once.
 """
 
-import argparse
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
 from harness.bench.scene_objectfile import objectfile_folder
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 
 Seconds = tuple[float, float]
 """On the clock, and of CPU."""
@@ -44,14 +42,14 @@ def openers(folder: Path) -> dict[str, Callable[[], Any]]:
 
 
 def main() -> None:
-    """Open, and print a table."""
-    options = argparse.ArgumentParser(description=__doc__)
+    """Open, and print or write a table."""
+    options = benchmark_parser(__doc__)
     options.add_argument("objects", nargs="+")
     options.add_argument("--repeat", type=int, default=5)
     given = options.parse_args()
     folders = {name: objectfile_folder(name, Path.cwd()) for name in given.objects}
     loading = timed(lambda: openers(Path()))
-    table = Table("object", "what", "first, s", "CPU", "again, s", "CPU", title=_loaded(loading))
+    rows: list[tuple[Cell, ...]] = [("programs, once", *loading, None, None)]
     for name, folder in folders.items():
         total = [0.0, 0.0]
         for what, opened in openers(folder).items():
@@ -60,13 +58,10 @@ def main() -> None:
                 min(each) for each in zip(*(timed(opened) for _ in range(given.repeat)), strict=True)
             )
             total = [total[0] + clock, total[1] + cpu]
-            table.add_row(name, what, *(f"{each:.3f}" for each in (*first, clock, cpu)))
-        table.add_row(name, "all", "", "", *(f"{each:.3f}" for each in total))
-    Console(width=110).print(table)
-
-
-def _loaded(seconds: Seconds) -> str:
-    return f"programs loaded in {seconds[0]:.2f} s, {seconds[1]:.2f} of CPU"
+            rows.append((f"{name}, {what}", *first, clock, cpu))
+        rows.append((f"{name}, all", None, None, *total))
+    heads = "opened; first [wall s] .2f; first [CPU s] .2f; again [wall s] .2f; again [CPU s] .2f"
+    finish_figure("objectfile", "opening", heads, rows)
 
 
 if __name__ == "__main__":

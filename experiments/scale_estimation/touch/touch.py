@@ -35,7 +35,7 @@ rim, whose normal is uncertain, costs up to 1.5 alone."""
 
 MIN_JUDGED_PLACES = 4
 """Places touched below which a misfit is no sign of another object: two or three contacts with the right
-object cost more than the limit in every second run (docs/results/scale.md)."""
+object cost more than the limit in every second run."""
 
 STRANGER = 0.5
 """Probability that they are, then: the size may be any."""

@@ -21,8 +21,8 @@ from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray, IntArray, read_only
 
 AMPLITUDE, LENGTH = 6.0e-3, 20.0e-3
-"""Standard deviation and correlation length of the prior's error, m: chosen among five pairs on 14
-development runs, see docs/results/shape.md."""
+"""Standard deviation and correlation length of the prior's error, m: the best of five
+pairs on development runs."""
 
 MARGIN = 30.0e-3
 """Distance from the prior to the border of the grid, m: contacts bend its surface no farther."""

@@ -47,8 +47,7 @@ SEARCHES, BLIND_SEARCHES = 3, 2
 """Searches of a shape that no search fits well; of one without a picture, at least."""
 
 UNEASY = 4.0
-"""Nuisance-parameter cost of an answer by few contacts above which one more search is made
-(docs/results/shape.md)."""
+"""Nuisance-parameter cost of an answer by few contacts above which one more search is made."""
 
 
 def reconstruct_with_prior(evidence: ShapeEvidence, settings: FamilySettings | None = None) -> ShapeEstimate:

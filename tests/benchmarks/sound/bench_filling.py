@@ -8,7 +8,6 @@ same edge, and every other option as in ``pytetwild``, its simplification, envel
 once more in the envelope that it has, a thousandth of the diagonal; our own is up to twice that.
 """
 
-import argparse
 import contextlib
 import tempfile
 import time
@@ -16,8 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.materials import material
@@ -26,6 +23,8 @@ from harness.objects.household import MATERIALS, build
 from harness.sim.modal.modal import HEARING, curved, default_edge, held_volume
 from harness.sim.solid.surface_measure import enclosed_volume
 from harness.sim.solid.tetrahedra import tetrahedra, tetrahedralize
+from tests.benchmarks.results import benchmark_parser, finish_figure, spread
+from tests.docs.results import Cell
 
 Filled = tuple[FloatArray, IntArray]
 
@@ -79,35 +78,32 @@ class Filling:
         self.curved.append(held_volume(curved(found, mesh, found)) / inside - 1.0)
 
 
-def spread(of: list[float], form: str) -> str:
-    """Median and extremes."""
-    return f"{np.median(of):{form}} ({min(of):{form}} to {max(of):{form}})"
-
-
 def main() -> None:
-    """Print one table."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Print or write one table."""
+    parser = benchmark_parser(__doc__)
     parser.add_argument("objects", nargs="*", default=["mug"])
     parser.add_argument("--repeats", type=int, default=1)
     asked = parser.parse_args()
-    table = Table("object", "filled", "s", "times ours", "cells", "volume of flat cells", "of curved cells")
+    rows: list[list[Cell]] = []
     for name in asked.objects:
         mesh = build(name)
         edge = default_edge(mesh, material(MATERIALS[name]), HEARING, 128)
         ways: dict[str, Callable[[Mesh, float], Filled]] = {
-            "ours": ours,
-            "ours, in its envelope": ours_closer,
-            "as it comes": as_it_comes,
+            "Touchstone": ours,
+            "Touchstone, envelope of 0.1 % of the diagonal": ours_closer,
+            "fTetWild, default options": as_it_comes,
         }
         found = {way: Filling() for way in ways}
         for _ in range(asked.repeats):
             for way, fill in ways.items():
                 found[way].add(mesh, edge, fill)
         for way, each in found.items():
-            ratio = np.median(np.array(each.took) / np.array(found["ours"].took))
-            volumes = spread(each.flat, "+.2e"), spread(each.curved, "+.2e")
-            table.add_row(name, way, spread(each.took, ".1f"), f"{ratio:.2f}", str(each.cells), *volumes)
-    Console(width=150).print(table)
+            ratio = np.median(np.array(each.took) / np.array(found["Touchstone"].took))
+            volumes = spread(each.flat), spread(each.curved)
+            rows.append([f"{name}, {way}", spread(each.took), float(ratio), each.cells, *volumes])
+    heads = "object and program; CPU time [s] .1f; over Touchstone .2f; cells"
+    errors = "volume error, flat cells .1e; volume error, curved cells .1e"
+    finish_figure("modes", "filling", f"{heads}; {errors}", rows)
 
 
 if __name__ == "__main__":

@@ -6,16 +6,14 @@ extremes after every round. Process time of one thread; the programs take turns,
 machine does slows each alike, and solve the same ten-node cells. Without CalculiX it says so.
 """
 
-import argparse
 import shutil
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 from scipy.sparse.linalg import eigsh
 from threadpoolctl import threadpool_limits
 
@@ -24,11 +22,12 @@ from harness.basics.materials import MATERIALS, Material
 from harness.sim.modal.solve import Elasticity, solve_mesh
 from harness.sim.modal.system import modal_system
 from harness.sim.solid.modal_mesh import QuadraticMesh
+from tests.benchmarks.results import benchmark_parser, finish_figure, spread
 from tests.oracles.calculix import WHY_NOT, Run, run, write_input
 from tests.samples.sized_mug import mug
 
 CERAMIC = MATERIALS["ceramic"]
-OURS = "ours, counted"
+OURS = "Touchstone"
 
 
 def ours(mesh: QuadraticMesh, of: Material, count: int) -> FloatArray:
@@ -67,26 +66,17 @@ def peak() -> float:
     return int(status.split("VmHWM:")[1].split()[0]) / 1024
 
 
-def said(numbers: Sequence[float]) -> str:
-    """Median and extremes."""
-    return f"{np.median(numbers):.2f} ({min(numbers):.2f} to {max(numbers):.2f})"
-
-
-def shown(title: str, ran: dict[str, list[Run]]) -> Table:
-    """A row a program; ratios are of the two runs of one round."""
-    table = Table(title=title)
-    for heading in ("program", "runs", "CPU s", "times ours", "peak MB", "Hz apart"):
-        table.add_column(heading)
-    base = ran[OURS]
+def show(case: str, ran: dict[str, list[Run]]) -> None:
+    """Print or write a row for each program; ratios are of the two runs of one round."""
+    base, rows = ran[OURS], []
     for name, runs in ran.items():
         ratios = [one.seconds / other.seconds for one, other in zip(runs, base, strict=False)]
         apart = hertz(name, runs[-1]) / base[-1].values - 1.0
         most = max(one.peak for one in runs)
-        took = [one.seconds for one in runs]
-        table.add_row(
-            name, str(len(runs)), said(took), said(ratios), f"{most:.0f}", f"{np.abs(apart).max():.0e}"
-        )
-    return table
+        took = spread([one.seconds for one in runs])
+        rows.append((f"{name}, {case}", len(runs), took, spread(ratios), most, float(np.abs(apart).max())))
+    heads = "program; runs; CPU time [s] .2f; over Touchstone, round by round .1f; peak memory [MB] .0f"
+    finish_figure("modes", "peers", f"{heads}; largest relative difference of a frequency .0e", rows)
 
 
 def hertz(name: str, one: Run) -> FloatArray:
@@ -96,7 +86,7 @@ def hertz(name: str, one: Run) -> FloatArray:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("--unknowns", type=int, default=30_000)
     parser.add_argument("--modes", type=int, default=60)
     parser.add_argument("--repeats", type=int, default=5)
@@ -104,25 +94,25 @@ def main() -> None:
     parser.add_argument("--scipy", action="store_true")
     parser.add_argument("--no-quiet", action="store_true", help="CalculiX with its usual output alone")
     asked = parser.parse_args()
-    mesh, console = mug(asked.unknowns), Console(width=120)
+    mesh = mug(asked.unknowns)
     works: dict[str, Callable[[], Run]] = {OURS: lambda: here(lambda: ours(mesh, CERAMIC, asked.modes))}
     if asked.scipy:
         works["scipy eigsh"] = lambda: here(lambda: plain_scipy(mesh, CERAMIC, asked.modes))
     if shutil.which("ccx") is None:
-        console.print(WHY_NOT)
+        Console().print(WHY_NOT)
     else:
         works["CalculiX"] = lambda: calculix(mesh, CERAMIC, asked.modes, quiet=False)
         if not asked.no_quiet:
             works["CalculiX, without output"] = lambda: calculix(mesh, CERAMIC, asked.modes, quiet=True)
     ours(mesh, CERAMIC, 1)
     ran: dict[str, list[Run]] = {}
-    title = f"mug, {3 * len(mesh.nodes)} unknowns, {asked.modes} modes: median (extremes)"
+    case = f"{asked.modes} modes, {3 * len(mesh.nodes)} unknowns"
     with threadpool_limits(limits=1):
         for number in range(asked.repeats):
             for name, work in works.items():
                 if name == OURS or number < (asked.peer_repeats or asked.repeats):
                     ran.setdefault(name, []).append(work())
-            console.print(shown(title, ran))
+            show(case, ran)
 
 
 if __name__ == "__main__":

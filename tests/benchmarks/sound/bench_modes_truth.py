@@ -5,15 +5,12 @@ prints one row a case: unknowns, process seconds of assembly and solve on one th
 the boxes the median and extremes of the repeats), and the worst relative error of the modes named.
 """
 
-import argparse
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 from manifold3d import Manifold
-from rich.console import Console
-from rich.table import Table
 
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.materials import MATERIALS, Material
@@ -23,6 +20,7 @@ from harness.sim.modal.element_edge import finely_filled
 from harness.sim.modal.modal import curved
 from harness.sim.modal.solve import Solution, solve_mesh
 from harness.sim.solid.modal_mesh import QuadraticMesh
+from tests.benchmarks.results import benchmark_parser, finish_figure, spread
 from tests.oracles.exact_bars import astm_bending, astm_torsion
 from tests.oracles.exact_plate import guided_plate, on_lower_edges, sliding_sides
 from tests.oracles.exact_solids import exact_ball, exact_box, octant_shell, on_planes, radial_frequencies
@@ -230,7 +228,7 @@ def _worst(found: FloatArray, expected: FloatArray) -> float:
 
 def main() -> None:
     """Print the table; ``--fine`` adds the sizes that take a minute."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("--fine", action="store_true", help="the sizes that take a minute")
     parser.add_argument("--repeats", type=int, default=1)
     parser.add_argument("--only", nargs="+", choices=CASES, default=list(CASES))
@@ -246,14 +244,13 @@ def main() -> None:
         "counted": lambda: counted((10, 20) if fine else (10,)),
         "thin": lambda: thin((10, 20), len(UP_TO)) if fine else thin((10,), 1),
     }
-    table = Table(title="process seconds of assembly and solve on one thread: median (extremes)")
-    for heading in ("case", "unknowns", "s", "worst error"):
-        table.add_column(heading)
+    heads = "case; unknowns; assembly and solution, one thread [CPU s] .2f; largest relative error .2e"
     for case in asked.only:
-        for name, unknowns, took, worst in rows[case]():
-            spread = f" ({min(took):.2f} to {max(took):.2f})" if len(took) > 1 else ""
-            table.add_row(name, str(unknowns or ""), f"{np.median(took):.2f}{spread}", f"{worst:.2e}")
-    Console(width=130).print(table)
+        found = [
+            (name, unknowns or None, spread(took) if len(took) > 1 else took[0], worst)
+            for name, unknowns, took, worst in rows[case]()
+        ]
+        finish_figure("modes", case, heads, found)
 
 
 if __name__ == "__main__":

@@ -9,20 +9,18 @@ Poisson's ratio: what the springs are off by, of a ball and a flat face, small t
 The third is of four forces measured on a real gel (``published_force``): the modulus that each asks for.
 """
 
-import argparse
 import time
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from harness.basics.arrays import FloatArray
 from harness.sim.gel.contact_force import PARTS, ForceLevel, contact_force
 from harness.sim.gel.elastic import GelElastic
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 from tests.oracles.published_force import DEPTHS, FORCES, THICKNESS, moduli
 from tests.samples.pressed_shapes import Pair, places
 
-CONSOLE = Console(width=118, highlight=False)
 ROWS, COLUMNS, PITCH, THICK = 240, 320, 0.0634e-3, 2.5e-3
 FINER = 3
 GEL = GelElastic(0.3e6, 0.0, 0.485, 0.0, 0.0)
@@ -65,22 +63,19 @@ def _means(fine: FloatArray) -> FloatArray:
 
 
 def main() -> None:
-    """Print both tables."""
-    parser = argparse.ArgumentParser()
+    """Print or write the tables."""
+    parser = benchmark_parser(__doc__)
     parser.add_argument("--repeat", type=int, default=9)
     repeat = parser.parse_args().repeat
-    table = Table(title="error, stated share by squares, and milliseconds", title_justify="left")
-    table.add_column("press")
-    table.add_column("N", justify="right")
-    for level, cells in SETTINGS:
-        table.add_column(f"{level}, {cells} px" if level == "layer" else level, justify="right")
+    rows: list[list[Cell]] = []
     for name, fine in _shapes(FINER).items():
-        truth = contact_force(fine[None], PITCH / FINER, THICK, GEL).newtons[0]
+        truth = float(contact_force(fine[None], PITCH / FINER, THICK, GEL).newtons[0])
         texts = [_row(_means(fine), truth, level, cells, repeat) for level, cells in SETTINGS]
-        table.add_row(name, f"{truth:.3f}", *texts)
-    CONSOLE.print(table)
-    CONSOLE.print(_springs())
-    CONSOLE.print(_published())
+        rows.append([name, truth, *texts])
+    levels = [f"{level}, {cells} px" if level == "layer" else level for level, cells in SETTINGS]
+    finish_figure("touch_force", "levels", "; ".join(("press", "force [N]", *levels)), rows)
+    _springs()
+    _published()
 
 
 def _row(depth: FloatArray, truth: float, level: ForceLevel, cells: int, repeat: int) -> str:
@@ -91,18 +86,17 @@ def _row(depth: FloatArray, truth: float, level: ForceLevel, cells: int, repeat:
         contact_force(depth[None], PITCH, THICK, GEL, level, cells)
         took.append(1e3 * (time.thread_time() - began))
     stated = found.shares[0, PARTS.index("squares")]
-    return f"{found.newtons[0] / truth - 1.0:+.2%} ({stated:.2%}) {np.median(took):.1f} ms"
+    return f"{found.newtons[0] / truth - 1.0:+.2%} ({stated:.2%}), {np.median(took):.1f} ms"
 
 
-def _springs() -> Table:
-    table = Table(title="springs over the layer, less one: ball / flat face", title_justify="left")
-    table.add_column("radius of the contact, thicknesses")
+def _springs() -> None:
+    """Print the error of the springs relative to the layer, of a ball / of a flat face."""
     ratios = (0.3, 0.45, 0.485, 0.5)
-    for poisson in ratios:
-        table.add_column(f"{poisson:g}", justify="right")
-    for wide in (0.1, 0.2, 0.4, 0.8, 1.6):
-        table.add_row(f"{wide:g}", *(_off(wide, poisson) for poisson in ratios))
-    return table
+    heads = ("contact radius [thicknesses]", *(f"Poisson's ratio {poisson:g}" for poisson in ratios))
+    rows: list[tuple[Cell, ...]] = [
+        (wide, *(_off(wide, poisson) for poisson in ratios)) for wide in (0.1, 0.2, 0.4, 0.8, 1.6)
+    ]
+    finish_figure("touch_force", "winkler over layer", "; ".join(heads), rows)
 
 
 def _off(wide: float, poisson: float) -> str:
@@ -116,26 +110,23 @@ def _off(wide: float, poisson: float) -> str:
     return " / ".join(f"{off:+.1%}" for off in springs / layer - 1.0)
 
 
-def _published() -> Table:
-    table = Table(title="Young's modulus in MPa that each measured force asks for", title_justify="left")
-    for heading in (
-        "theory, Poisson's ratio",
-        *(f"{1e3 * d:g} mm, {f:.2f} N" for d, f in zip(DEPTHS, FORCES, strict=True)),
-    ):
-        table.add_column(heading, justify="right")
-    table.add_column("mean, scatter", justify="right")
+def _published() -> None:
+    """Print or write the modulus that each measured force implies."""
+    depths = (f"{1e3 * d:g} mm, {f:.2f} N [MPa] .3f" for d, f in zip(DEPTHS, FORCES, strict=True))
+    heads = "; ".join(("theory, Poisson's ratio", *depths, "mean [MPa] .3f", "scatter [%] .1f"))
+    rows: list[list[Cell]] = []
     theories: tuple[tuple[str, float, float, ForceLevel], ...] = (
         ("layer, 0.475", 0.475, THICKNESS, "layer"),
         ("layer, 0.485", 0.485, THICKNESS, "layer"),
         ("layer, 0.495", 0.495, THICKNESS, "layer"),
-        ("springs, 0.485", 0.485, THICKNESS, "winkler"),
+        ("winkler, 0.485", 0.485, THICKNESS, "winkler"),
         ("Hertz's half-space, 0.485", 0.485, np.inf, "layer"),
     )
     for words, poisson, thickness, level in theories:
         found = 1e-6 * moduli(poisson, thickness, level)
         scatter = found.std(ddof=1) / found.mean()
-        table.add_row(words, *(f"{each:.3f}" for each in found), f"{found.mean():.3f}, {scatter:.1%}")
-    return table
+        rows.append([words, *map(float, found), float(found.mean()), 100.0 * float(scatter)])
+    finish_figure("touch_force", "real", heads, rows)
 
 
 if __name__ == "__main__":

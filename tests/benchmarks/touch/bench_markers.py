@@ -12,8 +12,6 @@ from pathlib import Path
 from time import process_time
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 from scipy.spatial import cKDTree
 
 from calibration.markers.at_rest import lay_lattice
@@ -22,11 +20,12 @@ from harness.basics.arrays import FloatArray
 from harness.bench.sensor import GELSIGHT_R15, MarkerGrid
 from harness.picture.image_file import read_image
 from harness.sim.gel.markers import marker_displacements
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 from tests.oracles.marker_tensors import tensor_map
 from tests.samples.drawn_dots import DrawnDots
 from tests.support.real_data import WHY_NOT, find_shared_data
 
-CONSOLE = Console(width=118, highlight=False)
 _TIMES = 15
 
 DRAWN = {
@@ -43,11 +42,9 @@ DRAWN = {
 
 
 def main() -> None:
-    """Print both tables, and what moving dots takes."""
-    CONSOLE.print(_motion())
-    table = Table(title="drawn dots: pixels off their true places", title_justify="left")
-    for heading in ("case", "dots", "rms", "worst", "stated", "rms over stated", "seconds"):
-        table.add_column(heading, justify="left" if heading == "case" else "right")
+    """Print or write both tables."""
+    benchmark_parser(__doc__).parse_args()
+    rows: list[tuple[Cell, ...]] = []
     for words, drawn in DRAWN.items():
         picture = drawn.picture(seed=3)
         began = process_time()
@@ -56,21 +53,19 @@ def main() -> None:
         _, at = cKDTree(drawn.places()).query(dots.places)
         off = dots.places - drawn.places()[at]
         rms, over = np.sqrt(np.mean(off**2)), np.sqrt(np.mean((off / dots.sigma[:, None]) ** 2))
-        numbers = (rms, np.abs(off).max(), np.median(dots.sigma))
-        texts = [f"{number:.4f}" for number in numbers]
-        table.add_row(
-            words, f"{len(off)} of {drawn.wide * drawn.high}", *texts, f"{over:.2f}", f"{seconds:.2f}"
-        )
-    CONSOLE.print(table)
+        stated, count = float(np.median(dots.sigma)), f"{len(off)} of {drawn.wide * drawn.high}"
+        rows.append((words, count, float(rms), float(np.abs(off).max()), stated, float(over), seconds))
+    heads = "case; dots; rms error [px] .4f; worst [px] .3f; stated [px] .4f; rms over stated .2f"
+    finish_figure("touch_markers", "drawn", f"{heads}; CPU time [s] .1f", rows)
+    values = _motion()
     data = find_shared_data()
-    if data is None:
-        CONSOLE.print(WHY_NOT)
-        return
     for number in (0, 1):
+        if data is None:
+            break
         folder = data / "tactile/fots_markers"
         dots = find_dots(read_image(folder / f"{number}.png"))
-        rows = np.genfromtxt(folder / f"{number}.csv", delimiter=",", names=True)
-        published = np.column_stack([rows["Mx"] + rows["dx"], rows["My"] + rows["dy"]])
+        marks = np.genfromtxt(folder / f"{number}.csv", delimiter=",", names=True)
+        published = np.column_stack([marks["Mx"] + marks["dx"], marks["My"] + marks["dy"]])
         away, at = cKDTree(published).query(dots.places)
         off = dots.places - published[at]
         middle = np.median(off, axis=0)
@@ -78,32 +73,39 @@ def main() -> None:
         lattice = lay_lattice(dots.places)
         bent = np.hypot(*lattice.local.T)
         far, out = np.count_nonzero(away > 2.0), np.count_nonzero(bent > 0.06 * lattice.spacing)
-        CONSOLE.print(
-            f"FOTS {number}.png, touched: {len(off)} dots in {lattice.rows} x {lattice.columns}, "
-            f"{dots.cut} cut by the border; off the published whole pixels by {middle.round(2)} px, scatter "
-            f"{scatter.round(2)}, {far} by more than 2; stated {np.median(dots.sigma):.3f} px; off the grid "
-            f"by {bent.max():.1f} px at most, {out} dots by more than 6 %"
+        grid = (
+            f"{len(off)} on a grid of {lattice.rows} x {lattice.columns}; {dots.cut} at the border left out"
         )
+        values += [
+            (f"whole dots of FOTS {number}.png, touched", grid),
+            (
+                "their offset from the published whole pixels; its scatter",
+                f"{middle.round(2)}; {scatter.round(2)} px",
+            ),
+            ("dots farther than 2 px; stated error", f"{far}; {np.median(dots.sigma):.3f} px"),
+            ("largest distance from the grid; dots above 6 %", f"{bent.max():.1f} px; {out}"),
+        ]
+    finish_figure("touch_markers", "other", "quantity; value", values)
 
 
-def _motion() -> str:
-    """Seconds of the processor for a press of a ball on a gel with 100 dots, and for a tensor map."""
+def _motion() -> list[tuple[str, str]]:
+    """Measure CPU time for a press of a ball on a gel with 100 dots, and for a tensor map."""
     sensor = replace(GELSIGHT_R15, markers=MarkerGrid(10, 10, 1.5e-3, 0.3e-3))
     y, x = np.mgrid[:120, :160].astype(np.float64)
     away = sensor.pitch * np.hypot(x - 70.0, y - 55.0)
     pressed = np.maximum(0.0, np.sqrt(np.maximum(6e-3**2 - away**2, 0.0)) - 5e-3)[None]
     marker_displacements(pressed, sensor)
     took = [_seconds(partial(marker_displacements, pressed, sensor, nodes)) for nodes in (2.0, 4.0, 8.0)]
-    words = ", ".join(f"{1e3 * one:.1f}" for one in took)
-    said = f"100 dots under a ball, 2, 4 and 8 nodes to a thickness: {words} ms"
+    words = "; ".join(f"{1e3 * one:.1f}" for one in took)
+    rows = [("motion of 100 dots under a ball of 6 mm, 2; 4; 8 nodes to a thickness", f"{words} ms")]
     data = find_shared_data()
     if data is None:
-        return said
+        return [*rows, ("real data", WHY_NOT)]
     offsets, press, slide = _dome(data)
     began = process_time()
     known = tensor_map(offsets, press, slide, 0.3e-3)
     made = process_time() - began
-    return f"{said}; tensor map of {len(known.offsets)} published nodes: {made:.2f} s"
+    return [*rows, (f"tensor map of {len(known.offsets)} published nodes", f"{made:.2f} s")]
 
 
 def _seconds(call: Callable[[], object]) -> float:

@@ -1,0 +1,54 @@
+"""docs/results is rendered from its JSON, states where each figure comes from, and stays short."""
+
+import re
+from collections import Counter
+
+import pytest
+
+from tests.docs.results import DATA, FOLDER, pages, read_page
+
+ROOT = FOLDER.parents[1]
+PAGES = pages()
+NAMES = sorted(path.stem for path in DATA.glob("*.json"))
+COMMIT = r"not recorded|on the linked pages|[0-9a-f]{7,40}(-dirty)?(, [0-9a-f]{7,40})*"
+COMMAND = r"not recorded|on the linked pages|((PYTHONPATH=\.|[A-Z_]+=\d+) )?(python|touchstone|make) .*"
+MAX_WORDS = 10_000
+MAX_LIMITS_WORDS = 500
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_is_as_it_is_rendered(name: str) -> None:
+    assert (FOLDER / name).read_text(encoding="utf-8") == PAGES[name], "run `make results`"
+
+
+def test_every_page_has_data() -> None:
+    assert {path.name for path in FOLDER.glob("*.md")} == set(PAGES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_figure_states_its_command_and_commit(name: str) -> None:
+    figures = read_page(name).figures
+    assert max(Counter(figure.id for figure in figures).values()) == 1
+    for figure in figures:
+        assert re.fullmatch(COMMIT, figure.commit), figure.id
+        assert re.fullmatch(COMMAND, figure.command), figure.id
+        for script in re.findall(r"\btests/[\w/]+\.py\b", figure.command):
+            assert (ROOT / script).is_file(), figure.id
+        assert all(len(row) == len(figure.columns) for row in figure.rows), figure.id
+
+
+def test_benchmarks_write_figures_that_are_there() -> None:
+    written = {
+        pair
+        for path in (ROOT / "tests" / "benchmarks").rglob("*.py")
+        for pair in re.findall(r'finish_figure\(\s*"(\w+)",\s*"([\w-]+)"', path.read_text(encoding="utf-8"))
+    }
+    assert written
+    assert written <= {(name, figure.id) for name in NAMES for figure in read_page(name).figures}
+
+
+def test_results_and_limits_are_short() -> None:
+    words = sum(len(text.split()) for text in PAGES.values())
+    assert words <= MAX_WORDS
+    limits = (FOLDER.parent / "limits.md").read_text(encoding="utf-8")
+    assert len(limits.split()) <= MAX_LIMITS_WORDS
