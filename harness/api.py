@@ -13,17 +13,32 @@ if TYPE_CHECKING:
     from harness.tasks.modes import modes
     from harness.tasks.runs import answer
     from harness.tasks.touch import tactile_image
+    from harness.tasks.vision import ComparedVision, RenderedVision, compare_vision, render_vision
 
 _HOMES = {
+    "ComparedVision": "harness.tasks.vision",
     "RenderedAudio": "harness.tasks.audio",
+    "RenderedVision": "harness.tasks.vision",
     "answer": "harness.tasks.runs",
+    "compare_vision": "harness.tasks.vision",
     "modes": "harness.tasks.modes",
     "render_audio": "harness.tasks.audio",
+    "render_vision": "harness.tasks.vision",
     "tactile_image": "harness.tasks.touch",
 }
 """Name to the module that defines it."""
 
-__all__ = ["RenderedAudio", "answer", "modes", "render_audio", "tactile_image"]
+__all__ = [
+    "ComparedVision",
+    "RenderedAudio",
+    "RenderedVision",
+    "answer",
+    "compare_vision",
+    "modes",
+    "render_audio",
+    "render_vision",
+    "tactile_image",
+]
 
 
 def __getattr__(name: str) -> Any:

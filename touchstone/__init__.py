@@ -8,9 +8,29 @@ from typing import TYPE_CHECKING, Any
 from harness import api
 
 if TYPE_CHECKING:
-    from harness.api import RenderedAudio, answer, modes, render_audio, tactile_image
+    from harness.api import (
+        ComparedVision,
+        RenderedAudio,
+        RenderedVision,
+        answer,
+        compare_vision,
+        modes,
+        render_audio,
+        render_vision,
+        tactile_image,
+    )
 
-__all__ = ["RenderedAudio", "answer", "modes", "render_audio", "tactile_image"]
+__all__ = [
+    "ComparedVision",
+    "RenderedAudio",
+    "RenderedVision",
+    "answer",
+    "compare_vision",
+    "modes",
+    "render_audio",
+    "render_vision",
+    "tactile_image",
+]
 
 
 def __getattr__(name: str) -> Any:

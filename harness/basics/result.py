@@ -52,26 +52,27 @@ class Result:
         """Return the fields as JSON values; a number that is not finite is None."""
         return {"schema": self.schema, **_object(self)}
 
-    def columns(self) -> dict[str, list[str]]:
-        """Return the vectors of equal length as columns of text, by heading with unit."""
-        vectors = {
-            name: value for name, value in self._shown() if isinstance(value, np.ndarray) and value.ndim == 1
-        }
-        return {
-            " ".join(filter(None, heading(name))): [number_text(name, item) for item in value]
-            for name, value in vectors.items()
-        }
 
-    def rows(self) -> Iterator[tuple[str, str]]:
-        """Yield label and value of every other field that text shows."""
-        for name, value in self._shown():
-            if value is not None and not isinstance(value, np.ndarray) and name != "notes":
-                yield heading(name)[0], _text(name, value)
+def text_columns(result: Result) -> dict[str, list[str]]:
+    """Return the vectors of a result as columns of text, by heading with unit."""
+    return {
+        " ".join(filter(None, heading(name))): [number_text(name, item) for item in value]
+        for name, value in _shown(result)
+        if isinstance(value, np.ndarray) and value.ndim == 1
+    }
 
-    def _shown(self) -> Iterator[tuple[str, Any]]:
-        for item in fields(self):
-            if item.metadata.get("text", True):
-                yield item.name, vars(self)[item.name]
+
+def text_rows(result: Result) -> Iterator[tuple[str, str]]:
+    """Yield label and value of every other field that text shows."""
+    for name, value in _shown(result):
+        if value is not None and not isinstance(value, np.ndarray):
+            yield heading(name)[0], _text(name, value)
+
+
+def _shown(result: Result) -> Iterator[tuple[str, Any]]:
+    for item in fields(result):
+        if item.name != "notes" and item.metadata.get("text", True):
+            yield item.name, vars(result)[item.name]
 
 
 def heading(name: str) -> tuple[str, str]:

@@ -60,6 +60,8 @@ def print_result(result: "Result", as_json: bool) -> None:
 
     Text is the answer in words, a table of the vectors, and every other field with its unit.
     """
+    from harness.basics.result import text_columns, text_rows
+
     notes: Sequence[str] = getattr(result, "notes", ())
     for sentence in notes:
         warn(sentence)
@@ -68,7 +70,7 @@ def print_result(result: "Result", as_json: bool) -> None:
         return
     for sentence in result.summary():
         ANSWERS.print(sentence, markup=False)
-    columns = result.columns()
+    columns = text_columns(result)
     if columns:
         table = Table(*columns)
         length = max(map(len, columns.values()))
@@ -77,10 +79,10 @@ def print_result(result: "Result", as_json: bool) -> None:
         ANSWERS.print(table)
         if length > MAX_ROWS:
             ANSWERS.print(f"... and {length - MAX_ROWS} more rows; --json has all")
-    grid = Table.grid(padding=(0, 2))
-    for label, value in result.rows():
-        grid.add_row(escape(label), escape(value))
-    ANSWERS.print(grid)
+    rows = list(text_rows(result))
+    width = max((len(label) for label, _ in rows), default=0)
+    for label, value in rows:
+        ANSWERS.print(f"{label:<{width}}  {value}", markup=False)
 
 
 def warn(sentence: str) -> None:

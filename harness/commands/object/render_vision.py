@@ -1,33 +1,14 @@
 """``touchstone object render vision``: a picture of an object by its networks."""
 
 import re
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from harness.commands import options
 from harness.commands.object import vision_options
-from harness.commands.object.render_vision_answer import (
-    RenderedLook,
-    View,
-    as_json,
-    print_answer,
-    sheet,
-    write_arrays,
-)
-from harness.commands.object.vision_options import Three
-from harness.commands.output import emit
-
-if TYPE_CHECKING:
-    from harness.objectfile.vision.render import ObjectVision
-
-_MOST_SHEET = 2**24
-"""Pixels of all pictures of a turntable."""
-
-_FIRST = 256
-"""Columns, at most, of the picture that nobody sees."""
+from harness.commands.output import print_result
 
 
 def render(
@@ -65,78 +46,38 @@ def render(
 
     Try: touchstone object render vision objects/mug --camera 0.25 -0.2 0.2 --light 1 -1 1 --out mug.png
     """
+    from harness import api
     from harness.basics.quantities import ANGLE
-    from harness.objectfile.vision.render import RenderSettings
-    from harness.picture.image_file import write_png
 
     options.require_files(
         ("--out", out, ".png"), ("--depth-out", depth_out, ".npy"), ("--alpha-out", alpha_out, ".npy")
     )
-    angle = options.quantity("--field-of-view", field_of_view, ANGLE)
-    chosen, pixels = RenderSettings(rays=rays), _pixels(size, turntable)
-    begun = time.perf_counter()
-    of, vision = vision_options.opened(folder, threads)
-    views = _views(vision, pixels, camera, look_at, up, light, angle, turntable)
-    # The first picture, a small one, loads the compiled loops for all that follow.
-    eye, lamp = views[0]
-    width = min(eye.width, _FIRST)
-    first = eye.resized(width, max(1, round(eye.height * width / eye.width)))
-    vision.picture(first, lamp, chosen)
-    loaded, begun = time.perf_counter() - begun, time.perf_counter()
-    pictures = tuple(vision.picture(*view, chosen) for view in views)
-    seconds = {"load": loaded, "render": time.perf_counter() - begun}
-    found = RenderedLook(of, vision, views, pictures, seconds)
-    write_png(out, sheet(found))
-    if depth_out is not None:
-        write_arrays(depth_out, [picture.image.depth for picture in found.pictures])
-    if alpha_out is not None:
-        write_arrays(alpha_out, [picture.image.alpha for picture in found.pictures])
-    if json:
-        emit(as_json(found, out, depth_out, alpha_out))
-    else:
-        print_answer(found, out, depth_out, alpha_out)
+    rendered = api.render_vision(
+        folder,
+        camera=camera,
+        look_at=look_at,
+        up=up,
+        field_of_view=options.quantity("--field-of-view", field_of_view, ANGLE),
+        light=light,
+        size=_pixels(size),
+        rays=rays,
+        turntable=turntable,
+        threads=threads,
+        out=out,
+        depth_out=depth_out,
+        alpha_out=alpha_out,
+    )
+    print_result(rendered, json)
     return 0
 
 
-def _pixels(text: str, turntable: int | None) -> tuple[int, int]:
-    """Columns and rows."""
+def _pixels(text: str) -> tuple[int, int]:
+    """Return columns and rows."""
     from harness.basics.errors import WrongUse
-    from harness.objectfile.vision.view import require_size
 
     said = re.fullmatch(r"(\d{1,6})(?:[xX](\d{1,6}))?", text.strip())
     if said is None:
         raise WrongUse(
             f"--size {text} is no number of pixels; say a side as 256, or columns x rows as 320x240"
         )
-    width, height = int(said[1]), int(said[2] or said[1])
-    require_size(width, height)
-    if turntable is not None and not 1 <= turntable <= _MOST_SHEET // (width * height):
-        raise WrongUse(
-            f"--turntable {turntable} of {width} x {height} pixels each; say 1 to "
-            f"{_MOST_SHEET // (width * height)} pictures of that size, or smaller ones"
-        )
-    return width, height
-
-
-def _views(
-    vision: "ObjectVision",
-    pixels: tuple[int, int],
-    eye: Three | None,
-    target: Three | None,
-    up: Three | None,
-    light: Three | None,
-    angle: float,
-    turntable: int | None,
-) -> tuple[View, ...]:
-    import numpy as np
-
-    from harness.objectfile.vision.view import camera_for, light_for, turned
-    from harness.picture.pinhole import DirectionalLight
-
-    mesh = vision.surface
-    camera = camera_for(mesh, *pixels, eye, target, up, angle)
-    lamp = light_for(camera) if light is None else DirectionalLight(np.array(light))
-    if turntable is None:
-        return ((camera, lamp),)
-    axis = mesh.bounds.mean(axis=0) if target is None else np.array(target)
-    return tuple(turned(camera, lamp, axis, -2.0 * np.pi * k / turntable) for k in range(turntable))
+    return int(said[1]), int(said[2] or said[1])

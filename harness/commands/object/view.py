@@ -25,9 +25,11 @@ def view(
     Try: touchstone object view objects/mug
     """
     from harness.live_view.server import LiveFrames, LiveServer, ViewRequest
+    from harness.objectfile.file import ObjectFile
+    from harness.objectfile.vision.render import open_vision
 
-    of, vision = vision_options.opened(folder, threads)
-    frames = LiveFrames(of.description.name, vision)
+    of = ObjectFile.open(folder)
+    frames = LiveFrames(of.description.name, open_vision(of, threads))
     server = LiveServer(frames, port)
     try:
         # The first picture, which nobody sees, loads the compiled loops.

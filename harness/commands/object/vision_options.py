@@ -1,13 +1,8 @@
 """What every command that looks at an object's networks is told, described once."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-
-if TYPE_CHECKING:
-    from harness.objectfile.file import ObjectFile
-    from harness.objectfile.vision.render import ObjectVision
 
 Three = tuple[float, float, float]
 
@@ -39,16 +34,3 @@ Threads = Annotated[
     int | None,
     typer.Option("--threads", help="That share the work; as many as cores if left out.", min=1),
 ]
-
-
-def opened(folder: Path, threads: int | None) -> "tuple[ObjectFile, ObjectVision]":
-    """An object, and its look.
-
-    Raises:
-        DataRefused: it has none, or is damaged.
-    """
-    from harness.objectfile.file import ObjectFile
-    from harness.objectfile.vision.render import open_vision
-
-    of = ObjectFile.open(folder)
-    return of, open_vision(of, threads)

@@ -197,7 +197,7 @@ def test_people_are_told_what_was_drawn(
     asked = ["object", "render", "vision", str(box), "--out", str(tmp_path / "a.png"), "--size", "16x12"]
     assert invoke(asked) == 0
     said = capsys.readouterr().out
-    for words in ("box from (", "16 x 12 pixels; osf", "samples of", "load ", "a.png"):
+    for words in ("box from (", "16 x 12 pixels", "osf", "samples ", "load ", "a.png"):
         assert words in said
     assert invoke(["object", "info", str(box)]) == 0
     assert "osf: " in capsys.readouterr().out
