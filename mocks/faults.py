@@ -11,26 +11,14 @@ import numpy as np
 
 from harness.basics.clock import now
 from harness.basics.errors import WrongUse
-from mocks.ur.faults import KINDS as ARM_KINDS
 
-CAMERA_KINDS = ("none", "stall", "truncate", "drop", "freeze", "saturate")
+CAMERA_FAULTS = ("none", "stall", "truncate", "drop", "freeze", "saturate")
 """stall: nothing is sent. truncate: half of each JPEG is sent. drop: connections are reset and
 refused. freeze: the last frame again and again. saturate: an overexposed picture."""
 
-HAMMER_KINDS = ("none", "stall", "overflow", "lost_byte", "lost_word", "unplug")
+HAMMER_FAULTS = ("none", "stall", "overflow", "lost_byte", "lost_word", "unplug")
 """Of the hammer's box. stall: no samples and no answers. overflow: nothing leaves while samples go on.
 lost_byte, lost_word: one is missing from the stream. unplug: the cable is pulled, for good."""
-
-MICROPHONE_KINDS = ("unplug",)
-"""Of a microphone on a sound card. unplug: the card is taken away, for good."""
-
-KINDS = {
-    "gel": CAMERA_KINDS,
-    "camera": CAMERA_KINDS,
-    "arm": ARM_KINDS,
-    "hammer": HAMMER_KINDS,
-    "microphone": MICROPHONE_KINDS,
-}
 
 _KEYS = ("instrument", "kind", "seconds")
 
@@ -39,13 +27,17 @@ _KEYS = ("instrument", "kind", "seconds")
 class Fault:
     """One cue."""
 
-    instrument: str  #: ``"gel"``, ``"camera"``, ``"arm"``, ``"hammer"`` or ``"microphone"``.
-    kind: str  #: of the instrument's ``KINDS``.
+    instrument: str  #: by its name in the station.
+    kind: str  #: of those that the instrument's far end takes.
     seconds: float | None = None  #: how long; None until it is cleared.
 
 
-def parse(cue: Mapping[str, object]) -> Fault:
-    """The fault a cue asks for.
+def parse(cue: Mapping[str, object], kinds: Mapping[str, tuple[str, ...]]) -> Fault:
+    """Read a cue.
+
+    Args:
+        cue: as JSON.
+        kinds: of faults that each instrument takes.
 
     Raises:
         WrongUse: an unknown key, instrument or kind, or a duration that is not above zero.
@@ -54,10 +46,10 @@ def parse(cue: Mapping[str, object]) -> Fault:
     if unknown:
         raise WrongUse(f"a fault has the keys {', '.join(_KEYS)}; it has no {', '.join(unknown)}")
     instrument, kind, seconds = cue.get("instrument"), cue.get("kind"), cue.get("seconds")
-    if not isinstance(instrument, str) or instrument not in KINDS:
-        raise WrongUse(f"no instrument {instrument!r} to put a fault into; there are {', '.join(KINDS)}")
-    if not isinstance(kind, str) or kind not in KINDS[instrument]:
-        raise WrongUse(f"the {instrument} has no fault {kind!r}; it has {', '.join(KINDS[instrument])}")
+    if not isinstance(instrument, str) or instrument not in kinds:
+        raise WrongUse(f"no instrument {instrument!r} to put a fault into; there are {', '.join(kinds)}")
+    if not isinstance(kind, str) or kind not in kinds[instrument]:
+        raise WrongUse(f"the {instrument} has no fault {kind!r}; it has {', '.join(kinds[instrument])}")
     if seconds is None:
         return Fault(instrument, kind)
     if not isinstance(seconds, int | float) or isinstance(seconds, bool) or not 0.0 < seconds < np.inf:

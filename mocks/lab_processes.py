@@ -14,9 +14,10 @@ import signal
 import socket
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from multiprocessing.connection import Connection
+from typing import Protocol
 
 from harness.basics.errors import BenchFault
 from mocks.faults import Fault
@@ -63,16 +64,48 @@ class ChildPipe:
         return os.getppid() != self._parent
 
 
+class FarEnd(Protocol):
+    """The far end of one instrument's cable."""
+
+    @property
+    def address(self) -> str:
+        """Where the driver finds it: a host, a URL, the path of a port, the name of an input."""
+
+    @property
+    def environment(self) -> Mapping[str, str]:
+        """What a program must have in its environment to open it."""
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Kinds of faults that it takes."""
+
+    def wait_ready(self, timeout: float) -> None:
+        """Wait until the instrument answers; ``BenchFault`` after ``timeout`` s."""
+
+    def cue(self, fault: Fault) -> None:
+        """Begin a fault."""
+
+    def kill(self) -> None:
+        """End it now."""
+
+
 class LabChild:
-    """A process of the lab.
+    """A process of the lab; a ``FarEnd``.
 
     Args:
         name: of the instrument, as messages call it.
         run: what it does; it ends when ``ChildPipe.should_stop`` says so.
+        address: where the driver finds it.
+        faults: kinds of faults that it takes.
     """
 
-    def __init__(self, name: str, run: Callable[[ChildPipe], None]) -> None:
+    def __init__(
+        self, name: str, run: Callable[[ChildPipe], None], address: str = "", faults: tuple[str, ...] = ()
+    ) -> None:
         self.name = name
+        self.address = address
+        self.faults = faults
+        self.environment: Mapping[str, str] = {}
         self._connection, theirs = _CONTEXT.Pipe()
         self._process = _CONTEXT.Process(
             target=_begin, args=(run, theirs, os.getpid()), name=name, daemon=True

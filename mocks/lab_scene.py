@@ -139,9 +139,7 @@ def strikes_of(
     """
     if not scene.sensors.sound:
         return None
-    hammer, flange_from_hammer = station.hammer, station.flange_from_hammer
-    if hammer is None or flange_from_hammer is None:
-        raise WrongUse(f"the scene asks for sound; the station {station.title!r} has no [hammer]: add one")
+    hammer, flange_from_hammer = station.require_hammer()
     # Modes, room and microphone are imported by runs that are to be heard, and by no others.
     from mocks.daq.strike_counts import StrikeCounts
     from mocks.world.instrument import instrument_of

@@ -19,9 +19,9 @@ from harness.basics.clock import now
 from harness.basics.errors import BenchFault
 from harness.basics.starvation import LATE, WATCH, name_cause
 from harness.bench.device import Health
+from harness.bench.instruments.cameras import USB_CAMERA
 from harness.bench.reading import Channel, Reading
 from harness.bench.sensor import TactileSensor
-from harness.bench.station_sections import USB_CAMERA
 from harness.picture.image_file import decode_jpeg
 
 OPEN_TIMEOUT = 2.0

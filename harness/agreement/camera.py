@@ -19,7 +19,7 @@ from harness.basics.errors import DataRefused
 from harness.basics.geometry import apply, rotation_from_vector
 from harness.basics.mesh import Mesh
 from harness.basics.mesh_hull import hull_of
-from harness.bench.station_sections import CameraSection
+from harness.bench.instruments.cameras import CameraSection
 from harness.picture.camera_errors import CameraErrors
 from harness.picture.object_mask import mask_by_background, overlap
 from harness.picture.outline import SeenOutline, corners_of, directions, read_outline

@@ -6,7 +6,7 @@ robot's base; what the flange carries is the station's business.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar, runtime_checkable
 
 from harness.basics.arrays import FloatArray
 from harness.bench.reading import Reading
@@ -38,14 +38,29 @@ class Health:
     failure: str = ""  #: why nothing comes from it at present; empty while something does.
 
 
-class Arm(Protocol):
-    """A six-joint arm that moves only within the station's limits."""
+class Instrument(Protocol):
+    """What every instrument does, whatever it reads or moves."""
 
     def open(self) -> None:
-        """Connect; raises ``BenchFault`` naming the cable or the switch to look at."""
+        """Connect and begin to sample; raises ``BenchFault`` naming the cable or the switch to look at."""
 
     def close(self) -> None:
         """Stop, disconnect, release."""
+
+    def health(self) -> Health:
+        """Rate, drops and latency since opening."""
+
+
+@runtime_checkable
+class MovingInstrument(Protocol):
+    """An instrument that is stopped before any other is closed."""
+
+    def stop(self) -> None:
+        """Stop now, from any thread and in any state."""
+
+
+class Arm(Instrument, Protocol):
+    """A six-joint arm that moves only within the station's limits."""
 
     def state(self) -> ArmState:
         """The newest state; raises ``BenchFault`` where it is stale."""
@@ -71,34 +86,16 @@ class Arm(Protocol):
     def stop(self) -> None:
         """Stop now, from any thread and in any state."""
 
-    def health(self) -> Health:
-        """Rate, drops and latency since opening."""
 
-
-class TactileCamera(Protocol):
+class TactileCamera(Instrument, Protocol):
     """A gel seen from behind, or any camera."""
-
-    def open(self) -> None:
-        """Connect and wait for the first frame."""
-
-    def close(self) -> None:
-        """Release the stream."""
 
     def read(self, count: int, timeout: float) -> Reading:
         """The next ``count`` frames that arrive from now on, or ``BenchFault`` after ``timeout`` s."""
 
-    def health(self) -> Health:
-        """Rate, drops and latency since opening."""
 
-
-class ImpactHammer(Protocol):
+class ImpactHammer(Instrument, Protocol):
     """A hammer's force cell and, where one clock serves both, the microphone that hears it."""
-
-    def open(self) -> None:
-        """Connect and begin to sample."""
-
-    def close(self) -> None:
-        """Stop sampling and disconnect."""
 
     def capture(
         self, fire: Callable[[], None], before: float, after: float, timeout: float
@@ -121,18 +118,9 @@ class ImpactHammer(Protocol):
             BenchFault: samples were lost, their order was lost, or the link went away.
         """
 
-    def health(self) -> Health:
-        """Rate, drops and latency since opening."""
 
-
-class Microphone(Protocol):
+class Microphone(Instrument, Protocol):
     """What hears the object ring; readings are blocks of counts on ``microphone.pressure``."""
-
-    def open(self) -> None:
-        """Begin to listen; raises ``BenchFault`` naming the device that is missing or does not fit."""
-
-    def close(self) -> None:
-        """Stop listening."""
 
     def record(self, seconds: float) -> tuple[Reading, ...]:
         """The next ``seconds`` of sound: counts, flags, callback times and the fitted clock."""
@@ -152,5 +140,16 @@ class Microphone(Protocol):
         Flagged, not raised, where nothing is heard for ``timeout`` s.
         """
 
-    def health(self) -> Health:
-        """Rate, bad blocks and latency since opening."""
+
+_D = TypeVar("_D", bound=Instrument)
+
+
+class InstrumentName(str, Generic[_D]):
+    """The name of an instrument in a station, with the protocol of the instrument that it names."""
+
+
+ARM: InstrumentName[Arm] = InstrumentName("arm")
+GEL: InstrumentName[TactileCamera] = InstrumentName("gel")
+CAMERA: InstrumentName[TactileCamera] = InstrumentName("camera")
+HAMMER: InstrumentName[ImpactHammer] = InstrumentName("hammer")
+MICROPHONE: InstrumentName[Microphone] = InstrumentName("microphone")

@@ -33,6 +33,9 @@ SOLVED_WITHIN = 600.0
 
 ANSWER_WITHIN = 15.0
 END_WITHIN = 3.0
+COMMAND = (sys.executable, "-m", "mocks.lab")
+"""The program of a mocked lab."""
+
 _TAIL = 2000
 _SCHEMA = 1
 
@@ -41,14 +44,9 @@ _SCHEMA = 1
 class LabAddresses:
     """Where the mocked instruments are."""
 
-    arm: str  #: address of the controller.
-    gel: str  #: URL of the stream.
-    camera: str | None  #: URL of the stream, None without.
-    hammer: str | None  #: path of its box's serial port, None where the scene asks for no sound.
-    microphone: str | None = None
-    """name of a sound card's input, None where the hammer's box hears the strikes."""
+    addresses: Mapping[str, str]  #: by instrument: a host, a URL, the path of a port, the name of an input.
     environment: Mapping[str, str] = field(default_factory=dict)
-    """what a program must have in its environment to open that input."""
+    """what a program must have in its environment to open them."""
 
 
 class MockLab:
@@ -61,7 +59,7 @@ class MockLab:
         seed: of the world's draws.
         gap: path of the reality gap.
         truth: where the lab writes what is true.
-        command: the program; None for ``python -m mocks.lab``.
+        command: the program; None for ``COMMAND``.
         run_id: identity of the run, which the truth repeats; empty where no run is recorded.
     """
 
@@ -79,7 +77,7 @@ class MockLab:
         self._scene, self._station, self._mesh = scene, station, mesh
         self._options = ["--seed", str(seed), "--gap", str(gap), "--truth", str(truth)]
         self._options += ["--run", run_id]
-        self._command = [*(command or (sys.executable, "-m", "mocks.lab"))]
+        self._command = [*(command or COMMAND)]
         self._process: subprocess.Popen[bytes] | None = None
         self._folder: OwnedFolder | None = None
         self._waiting = b""
@@ -211,12 +209,4 @@ class MockLab:
 def _addresses(ready: Mapping[str, Any]) -> LabAddresses:
     if ready.get("ready") is not True:
         raise BenchFault(f"the mocked lab did not start: {ready.get('error', ready)}")
-    heard = ready["microphone"] or {"device": None, "environment": {}}
-    return LabAddresses(
-        arm=ready["arm"],
-        gel=ready["gel"],
-        camera=ready["camera"],
-        hammer=ready["hammer"],
-        microphone=heard["device"],
-        environment=heard["environment"],
-    )
+    return LabAddresses(ready["addresses"], ready["environment"])

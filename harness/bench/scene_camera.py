@@ -1,7 +1,6 @@
 """The scene camera as the object sees it: where it is, what lamps there are, and a frame of its stream."""
 
 import tempfile
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,17 +10,14 @@ from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import apply, inverse
 from harness.basics.mesh import Mesh
-from harness.bench.gap import gap_path
-from harness.bench.mock_lab import MockLab
+from harness.bench.device import CAMERA
 from harness.bench.scene import SceneFile
-from harness.bench.station import addressed, make_camera
+from harness.bench.station import RunContext, open_station
 from harness.bench.station_file import Station
 from harness.picture.pinhole import DirectionalLight, Pinhole
 
 _PATIENCE = 3.0
 """s for a frame to come."""
-
-_NO_CAMERA = "the station {!r} has no [camera]; describe it in the station file"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +41,7 @@ def scene_pinhole(station: Station, scene: SceneFile, mesh: Mesh) -> Pinhole:
     """
     section = station.camera
     if section is None:
-        raise WrongUse(_NO_CAMERA.format(station.title))
+        raise WrongUse(f"the station {station.title!r} has no [camera]; add one to its file")
     object_from_camera = inverse(scene.base_from_object(mesh)) @ section.base_from_camera.matrix
     middle = (0.5 * section.columns, 0.5 * section.rows)
     return Pinhole(section.columns, section.rows, section.focal_length, middle, object_from_camera)
@@ -91,17 +87,8 @@ def scene_frame(station: Station, scene: SceneFile, mesh: Mesh, seed: int = 0) -
     seen = scene.model_copy(
         update={"sensors": scene.sensors.model_copy(update={"camera": True, "sound": False})}
     )
-    with ExitStack() as stack:
-        where = station
-        if station.mock is not None:
-            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="touchstone-truth-"))
-            gap = gap_path(station.mock.gap)
-            lab = stack.enter_context(MockLab(seen, station, mesh, seed, gap, Path(folder) / "truth.json"))
-            where = addressed(station, lab.start())
-        camera = make_camera(where)
-        if camera is None:
-            raise WrongUse(_NO_CAMERA.format(station.title))
-        camera.open()
-        stack.callback(camera.close)
-        frame: ByteArray = camera.read(1, timeout=_PATIENCE).values[0]
-        return frame
+    with tempfile.TemporaryDirectory(prefix="touchstone-truth-") as folder:
+        context = RunContext(Path(folder) / "truth.json", mesh, seed)
+        with open_station(station, seen, context, only=[CAMERA]) as bench:
+            frame: ByteArray = bench.get(CAMERA).read(1, timeout=_PATIENCE).values[0]
+            return frame

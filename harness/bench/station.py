@@ -1,39 +1,31 @@
-"""The bench, opened: the station's instruments by their kind, all of them or none.
-
-The table of kinds is literal and names its drivers by import strings, loaded on use: nothing
-in the core imports what lies above it.
-"""
+"""The bench, opened: the station's instruments by name, all of them, or each by itself."""
 
 import logging
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol
+from typing import Any, Protocol, TypeVar, cast
 
-from harness.basics.errors import BenchFault, CalibrationRefused, SafetyStop, TouchstoneError, WrongUse
+from harness.basics.errors import BenchFault, SafetyStop, TouchstoneError, WrongUse
 from harness.basics.mesh import Mesh
-from harness.bench.device import Arm, ImpactHammer, Microphone, TactileCamera
-from harness.bench.experiments import loaded
+from harness.bench.device import (
+    ARM,
+    GEL,
+    Arm,
+    Health,
+    Instrument,
+    InstrumentName,
+    MovingInstrument,
+    TactileCamera,
+)
 from harness.bench.gap import gap_path
-from harness.bench.mock_lab import LabAddresses, MockLab
-from harness.bench.scene import SceneFile
+from harness.bench.mock_lab import MockLab
+from harness.bench.scene import SceneFile, scene_from_options
 from harness.bench.station_file import Station
-
-INSTRUMENTS = {
-    "ur": "drivers.ur.arm:UrArm",
-    "gelsight-http": "drivers.camera.http_camera:gelsight",
-    "camera-http": "drivers.camera.http_camera:scene_camera",
-    "dataq": "drivers.dataq.hammer:DataqHammer",
-    "portaudio": "drivers.microphone.microphone:PortAudioMicrophone",
-}
-"""Instrument kind to driver."""
-
-LIMITS = {"ur": "drivers.ur.safety:SafetyLimits"}
-"""Arm kind to the form in which its driver takes the station's limits."""
 
 _LOG = logging.getLogger(__name__)
 
@@ -53,23 +45,56 @@ def _ignore_mark(step: int, sample: int) -> None:
     """What a real bench does with a mark."""
 
 
+_D = TypeVar("_D", bound=Instrument)
+
+
 @dataclass(frozen=True)
 class Bench:
-    """Instruments, open, and what is known of how they are mounted."""
+    """Instruments, open, and how they are mounted."""
 
-    arm: Arm  #: that moves.
-    gel: TactileCamera  #: on its flange.
-    camera: TactileCamera | None  #: that looks on; None without.
     station: Station  #: they belong to.
-    hammer: ImpactHammer | None = None  #: that strikes; None where the scene asks for no sound.
+    instruments: Mapping[str, Instrument]  #: by name, in opening order; those that the scene calls for.
     mark: Mark = _ignore_mark  #: see ``Mark``.
     pause: Callable[[float], None] = time.sleep  #: waits for so many seconds of the bench's own time.
     lab: MockLab | None = None  #: behind a mocked bench, for cueing faults; None at a real one.
-    microphone: Microphone | None = None
-    """that hears the strikes on a clock of its own; None where the hammer's box hears them."""
     simulated_clock: Callable[[], float] | None = None
     """returns s of simulated time, by which readings are stamped; None where the readings are stamped by the
     system's monotonic clock."""
+    failures: Mapping[str, TouchstoneError] = field(default_factory=dict)
+    """why an instrument did not open, by name; empty on a bench that opens as a whole."""
+
+    @property
+    def arm(self) -> Arm:
+        """The arm; raises as ``get``."""
+        return self.get(ARM)
+
+    @property
+    def gel(self) -> TactileCamera:
+        """The tactile camera on the flange; raises as ``get``."""
+        return self.get(GEL)
+
+    def find(self, name: InstrumentName[_D]) -> _D | None:
+        """Return an instrument; None where it is not open."""
+        return cast("_D | None", self.instruments.get(name))
+
+    def get(self, name: InstrumentName[_D]) -> _D:
+        """Return an instrument that this bench must have.
+
+        Raises:
+            WrongUse: the station has none, or the scene does not call for it.
+            TouchstoneError: why it did not open.
+        """
+        found = self.find(name)
+        if found is not None:
+            return found
+        if name in self.failures:
+            raise self.failures[name]
+        self.station.require_section(name)
+        raise WrongUse(f"the {name} is not open: the scene does not call for it")
+
+    def health(self) -> dict[str, Health]:
+        """Return how each instrument is doing, by name."""
+        return {name: instrument.health() for name, instrument in self.instruments.items()}
 
 
 @dataclass(frozen=True)
@@ -84,34 +109,78 @@ class RunContext:
 
 
 @contextmanager
-def open_station(station: Station, scene: SceneFile, run: RunContext) -> Iterator[Bench]:
-    """Open every instrument; on exit stop the arm first, close the rest, end the mocked lab.
+def open_station(
+    station: Station,
+    scene: SceneFile,
+    run: RunContext,
+    only: Collection[str] | None = None,
+    each: bool = False,
+) -> Iterator[Bench]:
+    """Open instruments; on exit stop the arm first, close the rest, end the mocked lab.
 
     Args:
         station: to open.
-        scene: says whether the camera is needed, and what a mocked world shows.
+        scene: selects the instruments, and is what a mocked world shows.
         run: the run this is for.
+        only: names of the instruments to open; None for all that the scene calls for.
+        each: whether an instrument that does not open is named in ``Bench.failures`` and the others stay
+            open; else nothing is opened.
 
     Raises:
+        WrongUse: the station has no such instrument.
         BenchFault: one or more instruments did not open: each is named, with the cable to check.
         SafetyStop: one of them refused for safety's sake.
     """
     with ExitStack() as stack:
-        where, lab = wired(stack, station, scene, run)
-        gel = make_gel(where)
-        arm = make_arm(where, alarm=lambda: gel.health().failure)
-        camera = make_camera(where) if scene.sensors.camera else None
-        hammer = make_hammer(where) if scene.sensors.sound else None
-        microphone = make_microphone(where) if scene.sensors.sound else None
-        _open_all(
-            stack, {"arm": arm, "gel": gel, "camera": camera, "hammer": hammer, "microphone": microphone}
-        )
-        stack.push(_Closing("arm, stopping", arm.stop))
+        if only is None:
+            sections = station.sections_for(scene.sensors)
+        else:
+            sections = {name: station.require_section(name) for name in only}
+        where, lab = _wired(stack, station, scene, run)
+        built: dict[str, Instrument] = {}
+        opened: dict[str, Instrument] = {}
+        failures: dict[str, TouchstoneError] = {}
+
+        def alarm() -> str:
+            """Return why no motion may go on; empty while there is no reason."""
+            guards = (name for name, section in sections.items() if section.guards_motion and name in opened)
+            return next(filter(None, (opened[name].health().failure for name in guards)), "")
+
+        for name in sections:
+            try:
+                built[name] = where.sections[name].build(where, alarm)
+            except TouchstoneError as error:
+                if not each:
+                    raise
+                failures[name] = error
+        for name, instrument in built.items():
+            try:
+                instrument.open()
+            except TouchstoneError as error:
+                failures[name] = error
+            else:
+                opened[name] = instrument
+                stack.push(_Closing(f"{name}, closing", instrument.close))
+        if failures and not each:
+            _raise_together(failures)
+        for name, instrument in reversed(opened.items()):
+            if isinstance(instrument, MovingInstrument):
+                stack.push(_Closing(f"{name}, stopping", instrument.stop))
         mark = _ignore_mark if lab is None else lab.mark
-        yield Bench(arm, gel, camera, station, hammer, mark, lab=lab, microphone=microphone)
+        yield Bench(station, opened, mark, lab=lab, failures=failures)
 
 
-def wired(
+def _raise_together(failures: Mapping[str, TouchstoneError]) -> None:
+    """Raise what kept instruments from opening, as one error."""
+    if len(failures) == 1:
+        raise next(iter(failures.values()))
+    listed = "".join(f"\n  - {name}: {error}" for name, error in failures.items())
+    unsafe = any(isinstance(error, SafetyStop) for error in failures.values())
+    kind = SafetyStop if unsafe else BenchFault
+    raise kind(f"{len(failures)} instruments did not open:{listed}")
+
+
+def _wired(
     stack: ExitStack, station: Station, scene: SceneFile, run: RunContext
 ) -> tuple[Station, MockLab | None]:
     """The station with the addresses of its instruments, and the lab behind a mocked one.
@@ -129,20 +198,7 @@ def wired(
     stack.callback(lab.close)
     started = lab.start()
     _surround(stack, started.environment)
-    return addressed(station, started), lab
-
-
-def addressed(station: Station, where: LabAddresses) -> Station:
-    """A mocked station with the addresses that its lab took."""
-    keys = {"arm": "address", "gel": "url", "camera": "url", "hammer": "port", "microphone": "device"}
-    sections = {name: getattr(station, name) for name in keys}
-    return station.model_copy(
-        update={
-            name: section.model_copy(update={keys[name]: getattr(where, name)})
-            for name, section in sections.items()
-            if section is not None
-        }
-    )
+    return station.with_addresses(started.addresses), lab
 
 
 def _surround(stack: ExitStack, environment: Mapping[str, str]) -> None:
@@ -156,131 +212,6 @@ def _surround(stack: ExitStack, environment: Mapping[str, str]) -> None:
         os.environ.update(before)
 
     stack.callback(restore)
-
-
-def make_arm(station: Station, alarm: Callable[[], str] = lambda: "") -> Arm:
-    """The arm's driver, not yet open; its limits hold for the flange, the gel's housing and the hammer.
-
-    ``alarm`` says why a motion must end, in words; it is empty while all is well.
-    """
-    section = station.arm
-    made: Arm = loaded(INSTRUMENTS[section.kind])(
-        address=section.address,
-        model=section.model,
-        limits=loaded(LIMITS[section.kind])(**section.safety.model_dump()),
-        rate=section.rate,
-        tool_points=station.tool_points.tolist(),
-        alarm=alarm,
-    )
-    return made
-
-
-def make_gel(station: Station) -> TactileCamera:
-    """The gel's driver, not yet open."""
-    section = station.gel
-    made: TactileCamera = loaded(INSTRUMENTS[section.kind])(
-        url=section.url, sensor=section.sensor, serial=section.serial, nominal_rate=section.rate
-    )
-    return made
-
-
-def make_camera(station: Station) -> TactileCamera | None:
-    """The scene camera's driver, not yet open; None for a bench without."""
-    section = station.camera
-    if section is None:
-        return None
-    made: TactileCamera = loaded(INSTRUMENTS[section.kind])(
-        url=section.url, rows=section.rows, columns=section.columns, serial=section.serial
-    )
-    return made
-
-
-def make_hammer(station: Station) -> ImpactHammer:
-    """The hammer's driver, not yet open.
-
-    Raises:
-        WrongUse: the station has no hammer.
-        CalibrationRefused: of the box.
-    """
-    section = station.hammer
-    if section is None:
-        raise WrongUse(
-            f"the scene asks for sound, and the station {station.title!r} has no [hammer]; add one, or set "
-            "sensors.sound = false in the scene"
-        )
-    calibration = section.acquisition
-    made: ImpactHammer = loaded(INSTRUMENTS[section.kind])(
-        calibration=calibration if station.own_microphone is None else calibration.without_microphone,
-        port=section.port or "",
-        serial=section.serial,
-        model=section.model,
-        rate=section.rate,
-        threshold_counts=round(section.threshold / calibration.newtons_per_count),
-    )
-    return made
-
-
-def make_microphone(station: Station) -> Microphone | None:
-    """The driver of a microphone of its own, not yet open; None where the hammer's box hears the strikes.
-
-    Raises:
-        WrongUse: the station has no hammer.
-        CalibrationRefused: of the hammer's box, or it is of a microphone on another converter.
-    """
-    section = station.own_microphone
-    if section is None:
-        return None
-    if station.hammer is None:
-        raise WrongUse(
-            f"the station {station.title!r} has no [hammer], whose strikes would be heard; add one"
-        )
-    calibrated = station.hammer.acquisition.microphone_full_scale_counts
-    if calibrated != section.full_scale:
-        raise CalibrationRefused(
-            f"the calibration {station.hammer.calibration!r} is of a microphone whose converter has full "
-            f"scale {calibrated}, the station's [microphone] has {section.full_scale}: set its bits, or "
-            "calibrate it"
-        )
-    made: Microphone = loaded(INSTRUMENTS[section.kind])(
-        device=section.device,
-        rate=round(section.rate or 0.0),
-        channels=section.channels or 1,
-        channel=section.channel or 0,
-        bits=section.bits or 24,
-        serial=section.serial,
-        latency=section.latency or 0.0,
-    )
-    return made
-
-
-def _open_all(stack: ExitStack, instruments: Mapping[str, "Instrument | None"]) -> None:
-    failures: dict[str, TouchstoneError] = {}
-    for name, instrument in instruments.items():
-        if instrument is None:
-            continue
-        try:
-            instrument.open()
-        except TouchstoneError as error:
-            failures[name] = error
-        else:
-            stack.push(_Closing(f"{name}, closing", instrument.close))
-    if len(failures) == 1:
-        raise next(iter(failures.values()))
-    if failures:
-        listed = "".join(f"\n  - {name}: {error}" for name, error in failures.items())
-        unsafe = any(isinstance(error, SafetyStop) for error in failures.values())
-        kind = SafetyStop if unsafe else BenchFault
-        raise kind(f"{len(failures)} instruments did not open:{listed}")
-
-
-class Instrument(Protocol):
-    """What every instrument is."""
-
-    def open(self) -> None:
-        """Connect."""
-
-    def close(self) -> None:
-        """Release."""
 
 
 @dataclass(frozen=True)
@@ -300,3 +231,53 @@ class _Closing:
                 raise
             _LOG.warning("%s: %s", self.what, failure)
         return False
+
+
+def scene_of_all(station: Station, scene: SceneFile | None = None) -> SceneFile:
+    """Return a scene that calls for every instrument of a station; of the mug where none is given."""
+    scene = scene or scene_from_options("builtin:mug")
+    has = {"sound": station.hammer is not None, "camera": station.camera is not None}
+    return scene.model_copy(update={"sensors": scene.sensors.model_copy(update=has)})
+
+
+@dataclass(frozen=True)
+class Checked:
+    """How the instruments of a bench are doing."""
+
+    instruments: tuple[Health, ...]  #: those that opened and send something.
+    failures: Mapping[str, TouchstoneError]  #: by name, why the others do not.
+    safety: str | None  #: the arm's; None where the arm did not open.
+    levels: Mapping[str, Mapping[str, float]]  #: what instruments read at rest, by name.
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the values for ``--json``."""
+        return {
+            "safety": self.safety,
+            "instruments": [asdict(health) for health in self.instruments],
+            "failures": {name: str(error) for name, error in self.failures.items()},
+            "hammer_levels": None,
+            **{f"{name}_levels": dict(levels) for name, levels in self.levels.items() if levels},
+        }
+
+
+def check_bench(bench: Bench) -> Checked:
+    """Read each instrument that opened; one that sends nothing fails alone."""
+    found: dict[str, Health] = {}
+    failures = dict(bench.failures)
+    levels: dict[str, Mapping[str, float]] = {}
+    remarks: dict[str, str] = {}
+    for name, instrument in bench.instruments.items():
+        try:
+            at_rest = bench.station.sections[name].probe(name, bench)
+            found[name] = instrument.health()
+        except TouchstoneError as error:
+            failures[name] = error
+        else:
+            levels[name] = at_rest.levels
+            remarks |= at_rest.remarks
+    healths = tuple(
+        replace(health, detail="; ".join(filter(None, (remarks.get(name), health.detail))))
+        for name, health in found.items()
+    )
+    arm = bench.find(ARM)
+    return Checked(healths, failures, None if arm is None else arm.state().safety, levels)

@@ -1,25 +1,23 @@
 """What the bench is made of: ``station.toml`` as one model."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, SerializeAsAny, model_validator
 
 from harness.basics.arrays import FloatArray
-from harness.basics.files.named_file import real_path
+from harness.basics.errors import WrongUse
 from harness.basics.geometry import apply
 from harness.basics.toml_file import StrictModel, load_toml, validate
 from harness.bench.bench_errors import USUAL, BenchErrors
+from harness.bench.instruments.arm import ArmSection
+from harness.bench.instruments.cameras import CameraSection, GelSection
+from harness.bench.instruments.section import InstrumentSection, Placement, section_of_kind
+from harness.bench.instruments.sound import HammerSection, MicrophoneSection
 from harness.bench.named_files import named_file
-from harness.bench.station_sections import (
-    ArmSection,
-    CameraSection,
-    GelSection,
-    HammerSection,
-    MicrophoneSection,
-    Placement,
-)
+from harness.bench.scene import Sensors
 
 
 class Frames(StrictModel):
@@ -46,6 +44,10 @@ class Station(StrictModel):
     camera: CameraSection | None = None  #: that looks at the bench, None without.
     hammer: HammerSection | None = None  #: on its flange, None without.
     microphone: MicrophoneSection | None = None  #: that hears the strikes, None without.
+    instruments: dict[str, Annotated[SerializeAsAny[InstrumentSection], BeforeValidator(section_of_kind)]] = (
+        Field(default={}, exclude_if=lambda named: not named)
+    )
+    """further instruments by name, each with its ``kind``."""
     frames: Frames  #: what the flange carries.
     errors: BenchErrors = USUAL  #: how far the bench may be from what station and scene state.
     mock: MockSection | None = None  #: present if the bench is a mocked one.
@@ -60,6 +62,56 @@ class Station(StrictModel):
         """``(4, 4)``, None without a hammer."""
         placement = self.frames.flange_from_hammer
         return None if placement is None else placement.matrix
+
+    @property
+    def sections(self) -> Mapping[str, InstrumentSection]:
+        """The table of each instrument by its name, in opening order."""
+        tables = {**dict(self), **self.instruments}
+        return {
+            name: table
+            for name, table in tables.items()
+            if isinstance(table, InstrumentSection) and table.is_instrument
+        }
+
+    def require_section(self, name: str) -> InstrumentSection:
+        """Return an instrument's table.
+
+        Raises:
+            WrongUse: the station has none of this name.
+        """
+        if name not in self.sections:
+            raise WrongUse(f"the station {self.title!r} has no [{name}]; add one to its file")
+        return self.sections[name]
+
+    def sections_for(self, sensors: Sensors) -> Mapping[str, InstrumentSection]:
+        """Return the tables of the instruments that a scene calls for, in opening order.
+
+        Raises:
+            WrongUse: the scene asks for sound, and the station has no hammer.
+        """
+        if sensors.sound:
+            self.require_hammer()
+        return {name: table for name, table in self.sections.items() if table.is_wanted(sensors)}
+
+    def require_hammer(self) -> tuple[HammerSection, FloatArray]:
+        """Return the hammer's table, and ``(4, 4)`` its tip's frame in the flange's.
+
+        Raises:
+            WrongUse: the station has none.
+        """
+        flange_from_hammer = self.flange_from_hammer
+        if self.hammer is None or flange_from_hammer is None:
+            raise WrongUse(
+                f"the scene asks for sound, and the station {self.title!r} has no [hammer]; add one, or set "
+                "sensors.sound = false in the scene"
+            )
+        return self.hammer, flange_from_hammer
+
+    def with_addresses(self, addresses: Mapping[str, str]) -> Self:
+        """Return the station with the addresses that a mocked lab took, by instrument."""
+        tables = {name: self.sections[name].with_address(address) for name, address in addresses.items()}
+        further = {name: tables.pop(name, table) for name, table in self.instruments.items()}
+        return self.model_copy(update={**tables, "instruments": further})
 
     @property
     def own_microphone(self) -> MicrophoneSection | None:
@@ -102,19 +154,16 @@ class Station(StrictModel):
 
     @model_validator(mode="after")
     def _has_addresses(self) -> Self:
-        given = {"arm.address": self.arm.address, "gel.url": self.gel.url}
-        if self.camera is not None:
-            given["camera.url"] = self.camera.url
-        if self.hammer is not None and not (self.mock is None and self.hammer.serial):
-            given["hammer.port"] = self.hammer.port
-        if self.own_microphone is not None:
-            given["microphone.device"] = self.own_microphone.device
-        for key, value in given.items():
-            if self.mock is None and value is None:
+        for name in self.instruments.keys() & type(self).model_fields.keys():
+            raise ValueError(f"'instruments.{name}': [{name}] is a table of its own; use another name")
+        for name, table in self.sections.items():
+            key = f"{'instruments.' if name in self.instruments else ''}{name}.{table.address_key}"
+            if self.mock is None and table.stated_address is None and table.needs_address:
                 raise ValueError(f"{key!r} is missing; only a station with [mock] has none")
-            if self.mock is not None and value is not None:
+            if self.mock is not None and table.stated_address is not None:
                 raise ValueError(
-                    f"{key!r} = {value!r}: a mocked bench takes an address of its own; remove it"
+                    f"{key!r} = {table.stated_address!r}: a mocked bench takes an address of its own; "
+                    "remove it"
                 )
         return self
 
@@ -130,18 +179,7 @@ def station_path(name: str) -> Path:
 
 def load_station(path: Path) -> Station:
     """A station file, the paths of its calibrations made absolute; ``WrongUse`` naming each mistake."""
-    station = load_toml(path, Station)
-    gel = station.gel.model_copy(update={"calibration": _found(path, station.gel.calibration)})
-    hammer = station.hammer
-    if hammer is not None:
-        hammer = hammer.model_copy(update={"calibration": _found(path, hammer.calibration)})
-    return station.model_copy(update={"gel": gel, "hammer": hammer})
-
-
-def _found(station: Path, calibration: str) -> str:
-    """The absolute path of a calibration beside the station file; else the name it is given by."""
-    beside = station.parent / calibration
-    return str(real_path(beside)) if beside.exists() else calibration
+    return load_toml(path, Station)
 
 
 def station_from_json(tree: Any, where: str) -> Station:

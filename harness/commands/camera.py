@@ -34,23 +34,29 @@ def camera(
     """
     import numpy as np
 
+    from harness.basics.errors import WrongUse
+    from harness.basics.files.named_file import nearest
     from harness.basics.whole_file import write_bytes_whole
-    from harness.bench.opening import open_camera, scene_of_all
+    from harness.bench.device import CAMERA, GEL
     from harness.bench.scene import scene_from_options
-    from harness.bench.station import RunContext
+    from harness.bench.station import RunContext, open_station, scene_of_all
     from harness.bench.station_file import load_station, station_path
     from harness.effects.scene_object import known_object
     from harness.picture.image_file import png_bytes
 
     options.require_files(("--out", out, ".png"))
+    cameras = {"gel": GEL, "scene": CAMERA}
+    if name not in cameras:
+        raise WrongUse(f"no camera {name!r}; {nearest(name, cameras)}")
     bench_file = load_station(station_path(station))
     scene = scene_of_all(bench_file, scene_from_options(object_ or "builtin:mug", material, units))
     with tempfile.TemporaryDirectory(prefix="touchstone-camera-") as folder:
         context = RunContext(Path(folder) / "truth.json", known_object(scene).mesh)
         with (
             CONSOLE.status(f"opening the {name} camera of {bench_file.title or station}"),
-            open_camera(name, bench_file, scene, context) as seeing,
+            open_station(bench_file, scene, context, only=[cameras[name]]) as bench,
         ):
+            seeing = bench.get(cameras[name])
             frame = np.asarray(seeing.read(_FRAMES, timeout=_PATIENCE).values[-1], dtype=np.uint8)
             health = seeing.health()
     write_bytes_whole(out, png_bytes(frame))

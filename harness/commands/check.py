@@ -25,8 +25,7 @@ def check(
 
     Try: touchstone check --station mock
     """
-    from harness.bench.opening import checked, open_each, scene_of_all
-    from harness.bench.station import RunContext
+    from harness.bench.station import RunContext, check_bench, open_station, scene_of_all
     from harness.bench.station_file import load_station, station_path
     from harness.effects.scene_object import known_object
 
@@ -36,10 +35,10 @@ def check(
         context = RunContext(Path(folder) / "truth.json", known_object(scene).mesh)
         with (
             CONSOLE.status(f"opening {bench_file.title or station}"),
-            open_each(bench_file, scene, context) as bench,
+            open_station(bench_file, scene, context, each=True) as bench,
         ):
             time.sleep(seconds)
-            found = checked(bench, bench_file)
+            found = check_bench(bench)
     if json:
         emit({"schema": 1, "station": station, **found.as_json()})
     else:

@@ -7,6 +7,9 @@ from tempfile import TemporaryDirectory
 from harness.commands import options
 from harness.commands.output import ANSWERS, CONSOLE, emit
 
+_REMARKS = {"arm": " (ports 29999, 30003, 30004, 30011)", "hammer": " (a serial port)"}
+"""What an address leaves open, by instrument."""
+
 
 def mock_lab(
     station: options.Station = "mock",
@@ -42,14 +45,11 @@ def mock_lab(
         try:
             where = lab.start()
             if json:
-                named = {"arm": where.arm, "gel": where.gel, "camera": where.camera}
-                emit({"schema": 1, **named, "hammer": where.hammer})
+                absent = dict.fromkeys(("arm", "gel", "camera", "hammer"))
+                emit({"schema": 1, **absent, **where.addresses})
             else:
-                ANSWERS.print(
-                    f"arm: {where.arm} (ports 29999, 30003, 30004, 30011)\ngel: {where.gel}", markup=False
-                )
-                if where.hammer is not None:
-                    ANSWERS.print(f"hammer: {where.hammer} (a serial port)", markup=False)
+                for name, address in where.addresses.items():
+                    ANSWERS.print(f"{name}: {address}{_REMARKS.get(name, '')}", markup=False)
             CONSOLE.print("Ctrl-C ends it")
             while True:
                 time.sleep(3600)

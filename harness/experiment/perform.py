@@ -140,12 +140,7 @@ def perform_on(
             answering.read(record)
     told = _Reading(progress, recording, answering)
     complete = perform(procedure.performer(run, helpers), bench, recording, bench.arm.stop, told)
-    health = {"arm": bench.arm.health(), "gel": bench.gel.health()}
-    if bench.hammer is not None:
-        health["hammer"] = bench.hammer.health()
-    if bench.microphone is not None:
-        health["microphone"] = bench.microphone.health()
-    return Performed(complete, health, answering, told.last)
+    return Performed(complete, bench.health(), answering, told.last)
 
 
 class _Reading:

@@ -76,12 +76,7 @@ def station_acquisition(scene: SceneFile, station: Station) -> AcquisitionCalibr
     """
     if not scene.sensors.sound:
         return None
-    if station.hammer is None:
-        raise WrongUse(
-            f"the scene asks for sound, and the station {station.title!r} has no [hammer]; add one, or set "
-            "sensors.sound = false in the scene"
-        )
-    return station.hammer.acquisition
+    return station.require_hammer()[0].acquisition
 
 
 def create_run(

@@ -208,11 +208,7 @@ def instruments(run: RunFiles, health: Mapping[str, Health] | None) -> tuple[Ins
     """
     if health is None:
         return Missing("estimated again from the recording: no instrument was open")
-    nominal = {"arm": run.station.arm.rate, "gel": run.station.gel.rate}
-    if run.station.hammer is not None:
-        nominal["hammer"] = run.station.hammer.rate
-    if run.station.microphone is not None and run.station.microphone.rate is not None:
-        nominal["microphone"] = run.station.microphone.rate
+    nominal = {name: section.nominal_rate for name, section in run.station.sections.items()}
     counts: dict[str, int] = {}
     for step in run.recording.steps():
         for reading in step.readings.values():

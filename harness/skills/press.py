@@ -20,7 +20,7 @@ import numpy as np
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault, MotionEnded, NotTouched
 from harness.basics.geometry import transform
-from harness.bench.device import Arm
+from harness.bench.device import HAMMER, Arm
 from harness.bench.reading import Channel, Reading
 from harness.bench.station import PRESS, Bench
 from harness.bench.travel import Trajectory, travel
@@ -188,7 +188,7 @@ class PressPerformer:
 
     def _strike(self, step: Step, moved: float, read: Sequence[Reading], bench: Bench) -> tuple[Reading, ...]:
         """The hammer where the gel was; nothing where the scene asks for no sound."""
-        if bench.hammer is None:
+        if HAMMER not in bench.instruments:
             return ()
         planned = step.parameters.get("strike")
         if planned is None and not self._explores:

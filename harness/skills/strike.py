@@ -14,6 +14,7 @@ import numpy as np
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault, WrongUse
 from harness.basics.geometry import quaternion_from_rotation, translation
+from harness.bench.device import HAMMER, MICROPHONE
 from harness.bench.listening import capture
 from harness.bench.microphone_take import BAD, take_of
 from harness.bench.reading import Channel, Reading
@@ -111,12 +112,7 @@ def planner(
     """
     if not scene.sensors.sound:
         return None
-    hammer, flange_from_hammer = station.hammer, station.flange_from_hammer
-    if hammer is None or flange_from_hammer is None:
-        raise WrongUse(
-            f"the scene asks for sound, and the station {station.title!r} has no [hammer]; add one, or set "
-            "sensors.sound = false in the scene"
-        )
+    hammer, flange_from_hammer = station.require_hammer()
     if hammer.strike != "arm":
         return None
     return StrikePlanner(bench, flange_from_hammer, hammer.stand_off, travels)
@@ -245,8 +241,7 @@ def _captured(bench: Bench, fire: Callable[[], None]) -> tuple[Reading, ...]:
 
 
 def _capture(bench: Bench, fire: Callable[[], None], timeout: float) -> tuple[Reading, ...]:
-    assert bench.hammer is not None
-    return capture(bench.hammer, bench.microphone, fire, BEFORE, AFTER, timeout)
+    return capture(bench.get(HAMMER), bench.find(MICROPHONE), fire, BEFORE, AFTER, timeout)
 
 
 def meets(bench: Bench, axis: FloatArray, travel: float, guard: SearchGuard) -> bool:

@@ -5,14 +5,18 @@ simulated bench clock, from zero.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import BenchFault, WrongUse
-from harness.bench.device import Health, Microphone
+from harness.bench.device import Health, Instrument
+from harness.bench.experiments import loaded
 from harness.bench.gap import load_gap
+from harness.bench.instruments.section import KINDS
 from harness.bench.reading import Channel, Reading
 from harness.bench.scene import SceneFile
 from harness.bench.station import LOOK, PRESS, STRIKE, Bench, RunContext
@@ -89,8 +93,71 @@ class InProcessCamera:
         return Health(self._name, f"{self._identity} in process", self._rate, 0, 0.0, "simulated time")
 
 
+@dataclass(frozen=True, eq=False)
+class SimulatedLab:
+    """What the instruments of a bench in process share; ``BuildInstrument`` is called with it."""
+
+    world: World  #: behind all of them.
+    stage: Stage  #: simulated time, step and sample.
+    station: Station  #: whose instruments are simulated.
+    arm: InProcessArm  #: carries the gel.
+    strikes: "StrikeCounts | None"  #: of the hammer; None where the scene asks for no sound.
+
+    @cached_property
+    def hammer(self) -> "InProcessHammer":
+        """The hammer; ``WrongUse`` where the station has none that the arm fires."""
+        from mocks.in_process.hammer import InProcessHammer  # by runs that are to be heard, and by no others
+
+        section, output = self.station.require_hammer()[0], self.station.arm.striker_output
+        if self.strikes is None or output is None:
+            raise WrongUse("a hammer in process needs a scene with sound and the arm's striker_output")
+        return InProcessHammer(self.strikes, self.arm, output, self.stage, section)
+
+
+BuildInstrument = Callable[[str, SimulatedLab], Instrument]
+"""Builds the instrument of this name; ``InstrumentKind.in_process`` names one."""
+
+
+def build_arm(_name: str, lab: SimulatedLab) -> Instrument:
+    """Return the arm."""
+    return lab.arm
+
+
+def build_gel(name: str, lab: SimulatedLab) -> Instrument:
+    """Build the tactile camera."""
+    sensor = lab.world.sensor
+    shape = sensor.rows, sensor.columns
+    return InProcessCamera(name, sensor.name, shape, lab.world.tactile_image, lab.arm, lab.stage)
+
+
+def build_camera(name: str, lab: SimulatedLab) -> Instrument:
+    """Build the scene camera; ``WrongUse`` where the station has none."""
+    section = lab.station.camera
+    if section is None:
+        raise WrongUse(f"the station {lab.station.title!r} has no [camera]; add one to its file")
+    shape = section.rows, section.columns
+    return InProcessCamera(name, "scene camera", shape, lab.world.scene_image, lab.arm, lab.stage)
+
+
+def build_hammer(_name: str, lab: SimulatedLab) -> Instrument:
+    """Return the hammer."""
+    return lab.hammer
+
+
+def build_microphone(_name: str, lab: SimulatedLab) -> Instrument:
+    """Build a microphone on a sound card, which hears the hammer; ``WrongUse`` where the station has none."""
+    from mocks.in_process.microphone import InProcessMicrophone
+    from mocks.sound_card.strike_on_card import CardConverter
+
+    section, box = lab.station.own_microphone, lab.station.require_hammer()[0]
+    if section is None or lab.strikes is None:
+        raise WrongUse(f"the station {lab.station.title!r} has no microphone on a sound card")
+    converter = CardConverter.of(box.acquisition)
+    return InProcessMicrophone(lab.strikes.sound, lab.hammer, box.rate, lab.stage, section, converter)
+
+
 def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Bench:
-    """The bench that ``open_station`` opens over every wire, without one; there is nothing to close.
+    """Build the bench that ``open_station`` opens over every wire, without one; there is nothing to close.
 
     Args:
         scene: what the world shows.
@@ -98,7 +165,7 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
         run: the run this is for; the truth is written where it says.
 
     Raises:
-        WrongUse: a station that is not mocked.
+        WrongUse: a station that is not mocked, or an instrument that only the mocked lab has.
     """
     if station.mock is None:
         raise WrongUse("only a station with [mock] can be simulated in process; open this one over its wires")
@@ -119,45 +186,15 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
         elif sample == LOOK:
             truth.looked()
 
-    hammer = None
-    if strikes is not None:
-        from mocks.in_process.hammer import InProcessHammer  # by runs that are to be heard, and by no others
-
-        assert station.hammer is not None
-        assert station.arm.striker_output is not None  # nobody strikes by hand at a mocked bench
-        hammer = InProcessHammer(strikes, arm, station.arm.striker_output, stage, station.hammer)
-    microphone = None
-    if strikes is not None and hammer is not None and station.own_microphone is not None:
-        microphone = _microphone(strikes, hammer, station, stage)
-    sensor, seen = world.sensor, nominal.camera
-    gel = InProcessCamera("gel", sensor.name, (sensor.rows, sensor.columns), world.tactile_image, arm, stage)
-    camera = None
-    if seen is not None:
-        shape = seen.rows, seen.columns
-        camera = InProcessCamera("camera", "scene camera", shape, world.scene_image, arm, stage)
-    return Bench(
-        arm,
-        gel,
-        camera,
-        station,
-        hammer,
-        mark,
-        stage.pause,
-        microphone=microphone,
-        simulated_clock=lambda: stage.time,
-    )
-
-
-def _microphone(
-    strikes: "StrikeCounts", hammer: "InProcessHammer", station: Station, stage: Stage
-) -> Microphone:
-    from mocks.in_process.microphone import InProcessMicrophone
-    from mocks.sound_card.strike_on_card import CardConverter
-
-    section, box = station.own_microphone, station.hammer
-    assert section is not None
-    assert box is not None
-    converter = CardConverter.of(box.acquisition)
-    made = InProcessMicrophone(strikes.sound, hammer, box.rate, stage, section, converter)
-    made.open()
-    return made
+    lab = SimulatedLab(world, stage, station, arm, strikes)
+    instruments: dict[str, Instrument] = {}
+    for name, section in station.sections_for(scene.sensors).items():
+        build = KINDS[section.kind].in_process
+        if build is None:
+            raise WrongUse(
+                f"the {name} ({section.kind}) is not simulated in process; run with --bench wires, or leave "
+                "it out of the station"
+            )
+        instruments[name] = loaded(build)(name, lab)
+        instruments[name].open()
+    return Bench(station, instruments, mark, stage.pause, simulated_clock=lambda: stage.time)

@@ -7,9 +7,9 @@ import numpy as np
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.resampling import resample
 from harness.bench.device import Health
+from harness.bench.instruments.sound import MicrophoneSection
 from harness.bench.microphone_take import OVERLOAD, readings_of_take
 from harness.bench.reading import Reading
-from harness.bench.station_sections import MicrophoneSection
 from mocks.in_process.arm import Stage
 from mocks.in_process.hammer import Fired, InProcessHammer
 from mocks.sound_card.strike_on_card import CardConverter

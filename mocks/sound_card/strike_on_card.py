@@ -13,6 +13,9 @@ from harness.basics.resampling import resample
 from harness.bench.acquisition import AcquisitionCalibration
 from harness.bench.station_file import Station
 from mocks.daq.strike_counts import StrikeCounts, StrikesOnBox
+from mocks.far_ends import LabBench
+from mocks.faults import Fault
+from mocks.lab_processes import FarEnd
 from mocks.shared_pose import Firing
 from mocks.sound_card.card import SoundCard
 from mocks.sound_card.player import MEANWHILE
@@ -74,8 +77,8 @@ class Wire:
         return played
 
 
-def plug_in_card(station: Station, folder: Path) -> tuple[SoundCard, Wire]:
-    """A sound card, playing, with the station's microphone on it.
+class PluggedCard:
+    """A sound card, playing, with the station's microphone on it; a ``FarEnd``.
 
     Args:
         station: with a microphone of its own.
@@ -85,14 +88,36 @@ def plug_in_card(station: Station, folder: Path) -> tuple[SoundCard, Wire]:
         BenchFault: no sound card can be mocked on this computer, and why.
         WrongUse: the station's microphone is on the hammer's box, or there is no hammer.
     """
-    section, hammer = station.own_microphone, station.hammer
-    if section is None or hammer is None:
-        raise WrongUse(f"the station {station.title!r} has no microphone on a sound card; none is mocked")
-    channels, rate = section.channels or 1, round(section.rate or 0.0)
-    card = SoundCard(rate, channels, under=folder)
-    card.start()
-    converter = CardConverter.of(hammer.acquisition)
-    return card, Wire(rate, channels, section.channel or 0, converter, hammer.rate)
+
+    faults = ("unplug",)  #: the card is taken away, for good.
+
+    def __init__(self, station: Station, folder: Path) -> None:
+        section, hammer = station.own_microphone, station.hammer
+        if section is None or hammer is None:
+            raise WrongUse(f"the station {station.title!r} has no microphone on a sound card; none is mocked")
+        channels, rate = section.channels or 1, round(section.rate or 0.0)
+        self.card = SoundCard(rate, channels, under=folder)
+        self.card.start()
+        converter = CardConverter.of(hammer.acquisition)
+        self.wire = Wire(rate, channels, section.channel or 0, converter, hammer.rate)
+        self.address = self.card.microphone
+        self.environment = self.card.environment
+
+    def wait_ready(self, timeout: float) -> None:
+        """Nothing to wait for: it plays once it is made."""
+
+    def cue(self, _fault: Fault) -> None:
+        """Take the card away."""
+        self.card.unplug()
+
+    def kill(self) -> None:
+        """End its processes."""
+        self.card.stop()
+
+
+def start_microphone(_name: str, lab: LabBench) -> FarEnd:
+    """Plug in a sound card with the station's microphone."""
+    return PluggedCard(lab.station, lab.folder)
 
 
 class StrikesOnCard(StrikesOnBox):

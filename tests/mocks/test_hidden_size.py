@@ -9,6 +9,7 @@ import pytest
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import apply
+from harness.bench.device import CAMERA
 from harness.bench.gap import load_gap
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station import BARE, LOOK, RunContext
@@ -72,7 +73,6 @@ def test_nothing_but_the_truth_tells_the_size(scene: SceneFile, station: Station
     assert "longest_side_m" not in json.dumps(asked.model_dump(mode="json"))
     truth = tmp_path / "truth.json"
     bench = in_process_bench(asked, station, RunContext(truth, known_object(asked).mesh, 3, "none"))
-    assert bench.camera is not None
     bench.mark(0, LOOK)
     assert json.loads(truth.read_text())["contacts"] == []  # a look is no contact
 
@@ -93,11 +93,10 @@ def test_the_camera_sees_the_bench_with_and_without_the_object(
     bench = in_process_bench(
         asked, station, RunContext(tmp_path / "t.json", known_object(asked).mesh, 3, "none")
     )
-    assert bench.camera is not None
     pictures = []
     for sample in (BARE, LOOK):
         bench.mark(0, sample)
-        pictures.append(bench.camera.read(1, 1.0).values[0].astype(int))
+        pictures.append(bench.get(CAMERA).read(1, 1.0).values[0].astype(int))
     apart = np.abs(pictures[0] - pictures[1]).max(axis=2) > 20
     assert 500 < apart.sum() < 0.3 * apart.size
 

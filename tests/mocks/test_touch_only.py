@@ -26,7 +26,7 @@ from mocks.in_process.bench import in_process_bench
 scene = scene_from_options("builtin:wrench")
 context = RunContext(Path("unused.json"), known_object(scene).mesh, 1, "none")
 bench = in_process_bench(scene, load_station(station_path("mock")), context)
-assert bench.hammer is None
+assert "hammer" not in bench.instruments
 """
 
 

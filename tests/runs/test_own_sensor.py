@@ -107,7 +107,7 @@ def test_a_toy_is_seen_over_its_wire(tmp_path: Path) -> None:
     station = load_station(write_station(tmp_path, "toy.toml", "toy.npz"))
     mesh = build("mug")
     with MockLab(touch_scene(), station, mesh, 3, gap_path("default"), tmp_path / "truth.json") as lab:
-        gel = gelsight(lab.start().gel, station.gel.sensor)
+        gel = gelsight(lab.start().addresses["gel"], station.gel.sensor)
         gel.open()
         assert gel.read(1, 5.0).values.shape == (1, 60, 80, 3)
         gel.close()

@@ -126,7 +126,9 @@ def test_a_gel_that_fails_does_not_stay_pressed(tmp_path: Path) -> None:
     recording = started.recording
     bench = bench_of(recording)
     with pytest.raises(BenchFault, match="gel: no frame"):
-        session_of.perform_on(replace(bench, gel=Blind(bench, 1)), recording, Quiet())
+        session_of.perform_on(
+            replace(bench, instruments={**bench.instruments, "gel": Blind(bench, 1)}), recording, Quiet()
+        )
     assert recording.committed == 1
     stand_off = np.array(recording.header.plan["contacts"][1]["base_from_stand_off"])
     assert bench.arm.state().base_from_flange[:3, 3] == pytest.approx(stand_off[:3, 3], abs=1e-4)

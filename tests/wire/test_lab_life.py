@@ -79,9 +79,9 @@ def gone(pids: list[int], address: str, seconds: float = 5.0) -> bool:
 
 def test_every_instrument_answers_on_an_address_of_its_own(lab: tuple[MockLab, LabAddresses]) -> None:
     _, where = lab
-    assert where.arm.startswith("127.")
-    assert where.camera is None
-    assert all(answers(where.arm, port) for port in (29999, 30003, 30004, 8080))
+    assert where.addresses["arm"].startswith("127.")
+    assert list(where.addresses) == ["arm", "gel"]
+    assert all(answers(where.addresses["arm"], port) for port in (29999, 30003, 30004, 8080))
 
 
 def test_a_mark_is_shown_before_it_is_answered(lab: tuple[MockLab, LabAddresses], truth: Path) -> None:
@@ -114,7 +114,7 @@ def test_a_request_it_does_not_know_is_refused(
 
 def test_a_fault_reaches_the_instrument(lab: tuple[MockLab, LabAddresses]) -> None:
     program, where = lab
-    gel = gelsight(where.gel, GELSIGHT_R15)
+    gel = gelsight(where.addresses["gel"], GELSIGHT_R15)
     gel.open()
     program.fault("gel", "stall", 0.8)
     with pytest.raises(BenchFault, match=r"of 6 frames.*0\.4 s"):
@@ -124,7 +124,7 @@ def test_a_fault_reaches_the_instrument(lab: tuple[MockLab, LabAddresses]) -> No
 
 
 def test_the_gel_shows_the_untouched_gel_at_home(lab: tuple[MockLab, LabAddresses]) -> None:
-    gel = gelsight(lab[1].gel, GELSIGHT_R15)
+    gel = gelsight(lab[1].addresses["gel"], GELSIGHT_R15)
     gel.open()
     first, second = gel.read(2, 2.0).encoded
     gel.close()
@@ -141,7 +141,7 @@ from harness.bench.station_file import load_station
 scene, station = load_scene(Path("scenes/mug_touch.toml")), load_station(Path("stations/mock.toml"))
 lab = t.make_lab(scene, station, Path({truth!r}))
 where = lab.start()
-print(lab.process_id, where.arm, lab._folder.path, flush=True)
+print(lab.process_id, where.addresses["arm"], lab._folder.path, flush=True)
 time.sleep(60.0)
 """
 
@@ -169,13 +169,13 @@ def test_two_labs_live_side_by_side_and_end_of_file_ends_one(
 ) -> None:
     other = make_lab(scene, station, tmp_path / "truth.json", seed=4)
     where = other.start()
-    assert where.arm != lab[1].arm
-    assert answers(where.arm, 30004)
+    assert where.addresses["arm"] != lab[1].addresses["arm"]
+    assert answers(where.addresses["arm"], 30004)
     pids = [other.process_id, *children(other.process_id)]
     assert len(pids) == 3
     other.close()
-    assert gone(pids, where.arm)
-    assert answers(lab[1].arm, 30004)
+    assert gone(pids, where.addresses["arm"])
+    assert answers(lab[1].addresses["arm"], 30004)
 
 
 def test_a_script_reads_where_the_instruments_are_while_they_run_and_ends_them() -> None:

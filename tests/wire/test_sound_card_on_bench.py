@@ -13,8 +13,9 @@ from harness.basics.errors import BenchFault
 from harness.basics.mesh import Mesh
 from harness.bench.acquisition import Strike
 from harness.bench.acquisition_channels import FORCE, PRESSURE
+from harness.bench.device import HAMMER, MICROPHONE
+from harness.bench.instruments.sound import rest_levels
 from harness.bench.microphone_take import BAD, CALLBACK, CLOCK, FLAGS, UNSURE, take_of
-from harness.bench.opening import rest_levels
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import RunContext, open_station
 from harness.bench.station_file import load_station
@@ -61,18 +62,16 @@ def wired(
     """Two contacts over the wires, a moment in which nothing is struck, then the card is taken away."""
     folder = tmp_path_factory.mktemp("card")
     with open_station(CARD, scene, RunContext(folder / "wire.json", mesh, SEED, GAP)) as bench:
-        assert bench.microphone is not None
-        assert bench.hammer is not None
-        contacts = performed(bench, plan)
+        contacts, calibration = performed(bench, plan), bench.station.require_hammer()[0].acquisition
         found = {
             "contacts": contacts,
-            "levels": rest_levels(bench.hammer, bench.microphone, bench.station),
-            "health": bench.microphone.health(),
+            "levels": rest_levels(bench.get(HAMMER), bench.get(MICROPHONE), calibration),
+            "health": bench.get(MICROPHONE).health(),
         }
         assert bench.lab is not None
         bench.lab.fault("microphone", "unplug")
         with pytest.raises(BenchFault) as gone:
-            rest_levels(bench.hammer, bench.microphone, bench.station)
+            rest_levels(bench.get(HAMMER), bench.get(MICROPHONE), calibration)
         return {**found, "gone": str(gone.value)}
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import BenchFault
+from harness.bench.device import CAMERA
 from harness.bench.scene import load_scene
 from harness.bench.station import RunContext, open_station
 from harness.bench.station_file import load_station, station_path
@@ -27,8 +28,7 @@ def test_a_mocked_bench_opens_reads_and_leaves_nothing_behind(tmp_path: Path) ->
         bench.mark(0, 0)
         frames = bench.gel.read(2, 5.0)
         assert frames.values.shape[1:] == (120, 160, 3)
-        assert bench.camera is not None
-        assert bench.camera.read(1, 5.0).values.shape == (1, 480, 640, 3)
+        assert bench.get(CAMERA).read(1, 5.0).values.shape == (1, 480, 640, 3)
         assert np.isfinite(bench.arm.state().joints).all()
         address = bench.gel.health().identity.rpartition("http://")[2].partition(":")[0]
         assert truth.is_file()

@@ -16,6 +16,7 @@ from harness.basics.geometry import rotation_from_quaternion, transform
 from harness.basics.mesh import Mesh
 from harness.bench.acquisition import strike_from_readings
 from harness.bench.acquisition_channels import CLOCK, FLAGS, FORCE, PRESSURE
+from harness.bench.device import HAMMER
 from harness.bench.reading import Reading
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import STRIKE, Bench, RunContext, open_station
@@ -66,11 +67,10 @@ def performed(bench: Bench, plan: RunPlan) -> Readings:
 
 
 def capture(bench: Bench, fire: Callable[[], None], timeout: float = 1.0) -> Readings:
-    assert bench.hammer is not None
     try:
-        read = bench.hammer.capture(fire, BEFORE, AFTER, timeout)
+        read = bench.get(HAMMER).capture(fire, BEFORE, AFTER, timeout)
     except BenchFault:  # a busy machine lost samples, and said so
-        read = bench.hammer.capture(fire, BEFORE, AFTER, timeout)
+        read = bench.get(HAMMER).capture(fire, BEFORE, AFTER, timeout)
     return {reading.channel.name: reading for reading in read}
 
 
@@ -90,8 +90,7 @@ def wired(
         nobody = capture(bench, lambda: None, 0.3)
         other = capture(bench, lambda: switch(bench, 1), 0.3)
         missed = capture(bench, lambda: switch(bench, 0), 0.3)
-        assert bench.hammer is not None
-        health = bench.hammer.health()
+        health = bench.get(HAMMER).health()
     told = json.loads(truth.read_text(encoding="utf-8"))
     return {
         "contact": contact,
@@ -115,7 +114,7 @@ def test_the_strike_of_the_wire_is_the_one_that_the_world_makes_of_that_pose(
 ) -> None:
     bench = in_process_bench(scene, station, RunContext(tmp_path / "t.json", mesh, SEED, GAP))
     there = wired["contact"]
-    strikes = vars(bench.hammer)["_strikes"]
+    strikes = vars(bench.get(HAMMER))["_strikes"]
     record = strikes.record(pose_of(there), STEP, STRIKE).astype(np.int64)
     force, pressure = counts(there, FORCE), counts(there, PRESSURE)
     level = np.median(record[:900, 0]) + 147

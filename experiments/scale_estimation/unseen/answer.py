@@ -20,7 +20,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.materials import Material
 from harness.bench.acquisition import Strike
-from harness.bench.station_sections import CameraSection
+from harness.bench.instruments.cameras import CameraSection
 from harness.experiment.repeated_readings import PlaceTolerance, group_by_place
 from harness.picture.outline import SeenOutline
 

@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
+from harness.bench.device import CAMERA
 from harness.bench.reading import Reading
 from harness.bench.station import BARE, LOOK, Bench
 from harness.recording.observation import BARE_IMAGE, IMAGE
@@ -109,7 +110,8 @@ class Exploration:
         if step.kind == SKIPPED:
             return ()
         if step.kind == "look":
-            if bench.camera is None:
+            camera = bench.find(CAMERA)
+            if camera is None:
                 raise WrongUse(
                     "a look needs the scene camera: set sensors.camera = true, or leave vision out"
                 )
@@ -126,7 +128,7 @@ class Exploration:
                 if self._ask is not None and bench.station.mock is None:
                     self._ask(f"{request}, then go on")
                 bench.mark(step.index, sample)
-                reading = bench.camera.read(FRAMES, _PATIENCE)
+                reading = camera.read(FRAMES, _PATIENCE)
                 readings.append(replace(reading, channel=replace(reading.channel, name=name)))
             return tuple(readings)
         return self._press.perform(step, bench)

@@ -30,8 +30,7 @@ def main() -> None:
         time.sleep(600)
     told = json.loads(Path(arguments.scene).read_text(encoding="utf-8"))
     gel = "http://127.7.7.7:8080/?action=stream"
-    where = {"arm": "127.7.7.7", "gel": gel, "camera": None, "hammer": None, "microphone": None}
-    say({"ready": True, **where})
+    say({"ready": True, "addresses": {"arm": "127.7.7.7", "gel": gel}, "environment": {}})
     for line in sys.stdin:
         request = json.loads(line)
         if "told" in request:

@@ -45,7 +45,7 @@ def alive(process_id: int) -> bool:
 
 def test_a_lab_says_where_its_instruments_are_and_takes_marks_and_faults(tmp_path: Path) -> None:
     with lab(tmp_path) as made:
-        where = LabAddresses("127.7.7.7", "http://127.7.7.7:8080/?action=stream", None, None)
+        where = LabAddresses({"arm": "127.7.7.7", "gel": "http://127.7.7.7:8080/?action=stream"})
         assert made.start() == where
         made.mark(3, -1)
         made.fault("gel", "stall", 2.0)

@@ -11,10 +11,12 @@ import pytest
 from drivers.microphone.microphone import PortAudioMicrophone
 from harness.basics.errors import BenchFault, CalibrationRefused, ProtectiveStop, SafetyStop, WrongUse
 from harness.basics.mesh import Mesh
-from harness.bench import station as station_module
-from harness.bench.device import Health
+from harness.bench.device import CAMERA, HAMMER, Health
+from harness.bench.instruments import arm as arm_module
+from harness.bench.instruments import section as section_module
+from harness.bench.instruments.section import KINDS
 from harness.bench.scene import SceneFile, Sensors, scene_from_options
-from harness.bench.station import INSTRUMENTS, LIMITS, RunContext, make_arm, make_microphone, open_station
+from harness.bench.station import RunContext, open_station
 from harness.bench.station_file import Station, load_station, station_from_json, station_path
 
 STATIONS = sorted((Path(__file__).parents[3] / "stations").glob("*.toml"))
@@ -39,21 +41,27 @@ class Instrument:
     def close(self) -> None:
         self._do("close")
 
-    def stop(self) -> None:
-        self._do("stop")
-
     def _do(self, verb: str) -> None:
         self.log.append(f"{self.name} {verb}")
         if f"{self.name} {verb}" in self.fails:
             raise self.fails[f"{self.name} {verb}"]
 
 
+class MovingInstrument(Instrument):
+    """An arm."""
+
+    def stop(self) -> None:
+        self._do("stop")
+
+
 @pytest.fixture
 def instruments(monkeypatch: pytest.MonkeyPatch) -> type[Instrument]:
     Instrument.log, Instrument.fails = [], {}
+    arm = KINDS["ur"].driver
     monkeypatch.setattr(
-        station_module, "loaded", lambda target: Instrument if target in INSTRUMENTS.values() else dict
+        section_module, "loaded", lambda target: MovingInstrument if target == arm else Instrument
     )
+    monkeypatch.setattr(arm_module, "loaded", lambda _: dict)
     return Instrument
 
 
@@ -93,7 +101,10 @@ def test_an_example_station_reads_and_survives_json(path: Path) -> None:
     assert station_from_json(json.loads(station.model_dump_json()), "recording") == station
 
 
-@pytest.mark.parametrize("target", [*INSTRUMENTS.values(), *LIMITS.values()])
+@pytest.mark.parametrize(
+    "target",
+    [arm_module.LIMITS, *(target for kind in KINDS.values() for target in vars(kind).values() if target)],
+)
 def test_every_import_string_of_the_table_resolves(target: str) -> None:
     module, _, name = target.partition(":")
     assert callable(vars(importlib.import_module(module))[name])
@@ -102,15 +113,17 @@ def test_every_import_string_of_the_table_resolves(target: str) -> None:
 @pytest.mark.parametrize("path", STATIONS, ids=lambda p: p.stem)
 def test_a_station_makes_the_real_drivers_without_opening_them(path: Path) -> None:
     station = load_station(path)
-    arm = make_arm(station)
-    limits = vars(arm)["limits"]
-    assert vars(limits) == station.arm.safety.model_dump()
-    assert station_module.make_gel(station) is not None
-    assert station_module.make_camera(station) is not None
+    mocked = dict.fromkeys(station.sections, "there") if station.mock is not None else {}
+    where = real() if station.mock is None else station.with_addresses(mocked)
+    built = {name: section.build(where) for name, section in where.sections.items()}
+    assert list(built)[:4] == ["arm", "gel", "camera", "hammer"]
+    assert vars(vars(built["arm"])["limits"]) == station.arm.safety.model_dump()
 
 
 def test_the_hammer_s_threshold_is_in_counts_of_its_calibration(instruments: type[Instrument]) -> None:
-    hammer: Any = station_module.make_hammer(load_station(station_path("mock")))
+    station = load_station(station_path("mock"))
+    assert station.hammer is not None
+    hammer: Any = station.hammer.build(station)
     calibration = hammer.options["calibration"]
     assert hammer.options["threshold_counts"] * calibration.newtons_per_count == pytest.approx(2.0, rel=0.01)
     assert (hammer.options["serial"], hammer.options["port"]) == ("mock-2108", "")
@@ -119,11 +132,12 @@ def test_the_hammer_s_threshold_is_in_counts_of_its_calibration(instruments: typ
 def test_a_scene_with_sound_needs_a_hammer(tmp_path: Path) -> None:
     deaf = load_station(station_path("mock")).model_copy(update={"hammer": None, "microphone": None})
     with pytest.raises(WrongUse, match=r"'mocked bench'.*\[hammer\]"):
-        station_module.make_hammer(deaf)
+        deaf.sections_for(Sensors(sound=True))
 
 
 def test_the_tool_s_corners_and_the_hammer_s_tip_are_under_the_limits(instruments: type[Instrument]) -> None:
-    arm: Any = make_arm(load_station(REAL))
+    station = load_station(REAL)
+    arm: Any = station.arm.build(station)
     points = np.array(arm.options["tool_points"])
     assert points.shape == (6, 3)
     centre = load_station(REAL).flange_from_gel[:3, 3]
@@ -146,7 +160,9 @@ def test_a_camera_that_the_scene_does_not_call_for_is_not_opened(
     tmp_path: Path, instruments: type[Instrument]
 ) -> None:
     with opened(tmp_path, camera=False) as bench:
-        assert bench.camera is None
+        assert bench.find(CAMERA) is None
+        with pytest.raises(WrongUse, match=r"camera.*scene"):
+            bench.get(CAMERA)
     assert "camera open" not in instruments.log
 
 
@@ -154,11 +170,11 @@ def test_the_hammer_is_opened_only_where_the_scene_asks_for_sound(
     tmp_path: Path, instruments: type[Instrument]
 ) -> None:
     with opened(tmp_path) as bench:
-        assert bench.hammer is None
+        assert bench.find(HAMMER) is None
     assert not any(line.startswith("hammer") for line in instruments.log)
     instruments.log.clear()
     with opened(tmp_path, sound=True) as bench:
-        assert bench.hammer is not None
+        assert bench.find(HAMMER) is not None
     assert instruments.log == [
         *(f"{name} open" for name in ("arm", "gel", "camera", "hammer")),
         "arm stop",
@@ -360,23 +376,28 @@ def on_card(**microphone: object) -> Station:
 
 def test_a_microphone_on_a_sound_card_is_made_as_the_station_says() -> None:
     station = on_card(channels=2, channel=1, latency="3 ms")
-    made = make_microphone(station)
+    assert station.own_microphone is not None
+    made = station.own_microphone.build(station)
     assert isinstance(made, PortAudioMicrophone)
     form = made.form
     assert (form.rate, form.bits, form.channels, form.channel, form.latency) == (48000, 24, 2, 1, 0.003)
     assert station.own_microphone == station.microphone
     by_box = load_station(station_path("mock"))
-    assert make_microphone(by_box) is None
+    assert "microphone" not in by_box.sections
     assert by_box.own_microphone is None
+
+
+def built_microphone(station: Station) -> object:
+    return station.sections["microphone"].build(station)
 
 
 def test_a_calibration_of_a_microphone_on_another_converter_is_refused() -> None:
     with pytest.raises(CalibrationRefused, match=r"8388607.*\[microphone\].*2147483647"):
-        make_microphone(on_card(bits=32))
+        built_microphone(on_card(bits=32))
     tree = json.loads(on_card().model_dump_json(by_alias=True))
     tree["hammer"]["calibration"] = "acquisition_bench"
     with pytest.raises(CalibrationRefused, match=r"32767.*8388607"):
-        make_microphone(station_from_json(tree, "the test"))
+        built_microphone(station_from_json(tree, "the test"))
 
 
 def test_the_box_of_a_hammer_heard_by_a_card_expects_its_second_input_shorted() -> None:

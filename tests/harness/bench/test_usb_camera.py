@@ -3,7 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
-from harness.bench.station_sections import CameraSection, GelSection
+from harness.bench.instruments.cameras import CameraSection, GelSection
 
 
 @pytest.mark.parametrize("url", ["/dev/video0", "0", "usb:0", "rtsp://10.0.0.2/live"])

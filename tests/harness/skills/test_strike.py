@@ -82,7 +82,7 @@ class Recorder:
         def pause(seconds: float) -> None:
             self.log.append("pause")
 
-        return Bench(arm, arm, None, STATION, arm, mark, pause)
+        return Bench(STATION, {"arm": arm, "gel": arm, "hammer": arm}, mark, pause)
 
 
 FIRED = ["listen", "output 0 on", "pause", "output 0 off"]

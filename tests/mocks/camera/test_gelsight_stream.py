@@ -12,7 +12,8 @@ import pytest
 from harness.basics.arrays import ByteArray
 from harness.basics.errors import WrongUse
 from mocks.camera.gelsight_stream import BOUNDARY, MjpegServer, encode, saturated
-from mocks.faults import Fault, parse
+from mocks.faults import CAMERA_FAULTS, Fault, parse
+from mocks.ur.faults import KINDS as ARM_FAULTS
 
 
 class Counter:
@@ -103,9 +104,12 @@ def test_encoding_keeps_the_picture_to_two_counts() -> None:
     assert np.abs(decoded[..., ::-1].astype(int) - smooth).mean() < 0.7
 
 
+KINDS = {"gel": CAMERA_FAULTS, "arm": ARM_FAULTS}
+
+
 def test_a_cue_becomes_a_fault() -> None:
-    assert parse({"instrument": "gel", "kind": "stall", "seconds": 2}) == Fault("gel", "stall", 2.0)
-    assert parse({"instrument": "arm", "kind": "protective_stop"}) == Fault("arm", "protective_stop")
+    assert parse({"instrument": "gel", "kind": "stall", "seconds": 2}, KINDS) == Fault("gel", "stall", 2.0)
+    assert parse({"instrument": "arm", "kind": "protective_stop"}, KINDS) == Fault("arm", "protective_stop")
 
 
 @pytest.mark.parametrize(
@@ -124,7 +128,7 @@ def test_a_cue_becomes_a_fault() -> None:
 )
 def test_a_mistyped_cue_is_refused(cue: dict[str, object]) -> None:
     with pytest.raises(WrongUse):
-        parse(cue)
+        parse(cue, KINDS)
 
 
 def test_saturation_clips_and_never_wraps() -> None:

@@ -6,8 +6,8 @@ import numpy as np
 
 from harness.basics.geometry import inverse, transform
 from harness.bench.gap import load_gap
+from harness.bench.instruments.arm import SafetySection
 from harness.bench.kinematics import nearest_branch
-from harness.bench.station_sections import SafetySection
 from harness.skills.press import ContactMotion, PressPerformer, Speeds
 from mocks.in_process.arm import InProcessArm, Stage
 from mocks.ur.hooks import HOME

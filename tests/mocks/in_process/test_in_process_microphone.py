@@ -10,7 +10,7 @@ from experiments.contact_localization.section import Localization
 from harness.basics.mesh import Mesh
 from harness.bench.acquisition import Strike, strike_from_readings
 from harness.bench.acquisition_channels import PRESSURE
-from harness.bench.device import Microphone
+from harness.bench.device import MICROPHONE, Microphone
 from harness.bench.microphone_take import UNSURE, take_of
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import Bench, RunContext
@@ -72,10 +72,9 @@ def test_it_is_a_microphone_that_listens_on_a_bench_of_its_own_station(
     scene: SceneFile, mesh: Mesh, tmp_path: Path
 ) -> None:
     bench = opened(scene, CARD, mesh, tmp_path)
-    known: Microphone | None = bench.microphone
-    assert known is not None
+    known: Microphone = bench.get(MICROPHONE)
     assert known.health().rate == pytest.approx(RATE * (1 + 1e-6 * DRIFT_PPM))
-    assert opened(scene, BOX, mesh, tmp_path).microphone is None
+    assert "microphone" not in opened(scene, BOX, mesh, tmp_path).instruments
     with pytest.raises(NotImplementedError, match=r"InProcessMicrophone\.capture"):
         known.capture(lambda: None, 0.0, 0.1, 1.0)
 
@@ -120,8 +119,7 @@ def test_an_estimate_reads_the_same_shares_of_the_same_peaks(
 
 
 def test_a_silent_bench_is_heard_in_any_stretch_of_time(scene: SceneFile, mesh: Mesh, tmp_path: Path) -> None:
-    microphone = opened(scene, CARD, mesh, tmp_path).microphone
-    assert microphone is not None
+    microphone = opened(scene, CARD, mesh, tmp_path).get(MICROPHONE)
     readings = {reading.channel.name: reading for reading in microphone.record(0.3)}
     counts = readings[PRESSURE].values
     assert counts.size >= 0.3 * RATE

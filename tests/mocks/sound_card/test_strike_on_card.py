@@ -15,7 +15,7 @@ from harness.bench.acquisition import shipped_acquisition
 from harness.bench.station_file import load_station, station_path
 from mocks.shared_pose import Firing
 from mocks.sound_card.player import MEANWHILE
-from mocks.sound_card.strike_on_card import AHEAD, NOISE, CardConverter, StrikesOnCard, Wire, plug_in_card
+from mocks.sound_card.strike_on_card import AHEAD, NOISE, CardConverter, PluggedCard, StrikesOnCard, Wire
 
 CALIBRATION = shipped_acquisition("acquisition_sound_card")
 CONVERTER = CardConverter.of(CALIBRATION)
@@ -142,4 +142,4 @@ def test_a_converter_stays_at_its_full_scale() -> None:
 
 def test_a_station_that_listens_with_the_box_has_no_card(tmp_path: Path) -> None:
     with pytest.raises(WrongUse, match="microphone"):
-        plug_in_card(load_station(station_path("mock")), tmp_path)
+        PluggedCard(load_station(station_path("mock")), tmp_path)

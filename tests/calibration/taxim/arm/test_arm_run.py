@@ -155,7 +155,7 @@ def test_a_creeping_gel_is_waited_for_and_its_pictures_count(tmp_path: Path) -> 
     recording = begun(tmp_path / "run").recording
     bench = opened(recording)
     slow = Creeping(bench.gel, lasts=0.5, share=0.3)
-    perform_on(replace(bench, gel=slow), recording, Quiet())
+    perform_on(replace(bench, instruments={**bench.instruments, "gel": slow}), recording, Quiet())
     run = read_arm_run(recording.folder)
     assert all(one.settled for one in run.taken)
     assert np.median([one.seconds for one in run.taken]) > 1.0
@@ -168,7 +168,7 @@ def test_a_gel_that_never_rests_is_waited_for_then_refused(tmp_path: Path) -> No
     bench = opened(recording)
     restless = Creeping(bench.gel, trembles=0.3)
     with pytest.raises(CalibrationRefused, match=r"\d+ as 'unsettled'"):
-        perform_on(replace(bench, gel=restless), recording, Quiet())
+        perform_on(replace(bench, instruments={**bench.instruments, "gel": restless}), recording, Quiet())
     taken = [one for one in recording.steps() if one.step.kind == "press"]
     assert len(taken) == 8
     assert all(one.readings["press.state"].values[-1][2] >= PressSettings().still.patience for one in taken)
@@ -182,7 +182,7 @@ def test_a_light_that_fades_stops_the_run_between_two_presses_and_says_so(tmp_pa
     bench = opened(recording)
     fading = Creeping(bench.gel, fades=1.0)
     with pytest.raises(CalibrationRefused, match=r"drift.*\b40\b"):
-        perform_on(replace(bench, gel=fading), recording, Quiet())
+        perform_on(replace(bench, instruments={**bench.instruments, "gel": fading}), recording, Quiet())
     assert 3 < recording.committed < 18
     run = read_arm_run(recording.folder)
     assert 25.0 < run.drift <= 40.0
@@ -197,7 +197,11 @@ def test_a_light_that_fades_stops_the_run_between_two_presses_and_says_so(tmp_pa
 def test_a_little_drift_is_told_and_goes_on(tmp_path: Path) -> None:
     recording = begun(tmp_path / "run").recording
     bench = opened(recording)
-    complete = perform_on(replace(bench, gel=Creeping(bench.gel, fades=0.1)), recording, Quiet()).complete
+    complete = perform_on(
+        replace(bench, instruments={**bench.instruments, "gel": Creeping(bench.gel, fades=0.1)}),
+        recording,
+        Quiet(),
+    ).complete
     assert complete
     run = read_arm_run(recording.folder)
     assert 4.0 < run.drift < 40.0
@@ -211,7 +215,7 @@ def test_where_no_ball_stands_the_run_ends_after_three_presses(tmp_path: Path) -
     bench = opened(recording)
     blind = Creeping(bench.gel, blind=True)
     with pytest.raises(NotTouched, match=r"\b3 presses"):
-        perform_on(replace(bench, gel=blind), recording, Quiet())
+        perform_on(replace(bench, instruments={**bench.instruments, "gel": blind}), recording, Quiet())
     assert recording.committed == 4
     for record in recording.steps()[1:]:
         motion = PressMotion.from_parameters(dict(record.step.parameters))

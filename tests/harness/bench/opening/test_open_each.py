@@ -1,5 +1,6 @@
 """Instruments opened each by itself: what opens is shown, what does not is named, and nothing else stops."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -7,13 +8,14 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import BenchFault, ProtectiveStop, TouchstoneError, WrongUse
-from harness.bench import opening as module
-from harness.bench.device import Health
-from harness.bench.opening import checked, open_camera, open_each, scene_of_all
+from harness.bench.device import ARM, Health
+from harness.bench.instruments import section as section_module
+from harness.bench.instruments.section import KINDS
 from harness.bench.reading import Channel, Reading
-from harness.bench.station import RunContext
+from harness.bench.station import RunContext, check_bench, open_station, scene_of_all
 from harness.bench.station_file import Station, load_station, station_path
 from harness.commands import check as command
+from harness.commands.camera import camera as photograph
 from harness.objects.household import build
 
 
@@ -23,7 +25,7 @@ class Fake:
     log: list[str]
     fails: dict[str, TouchstoneError]
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, **_: object) -> None:
         self.name = name
 
     def open(self) -> None:
@@ -31,9 +33,6 @@ class Fake:
 
     def close(self) -> None:
         self._do("close")
-
-    def stop(self) -> None:
-        self._do("stop")
 
     def read(self, count: int, timeout: float) -> Reading:
         self._do("read")
@@ -53,13 +52,22 @@ class Fake:
             raise self.fails[f"{self.name} {verb}"]
 
 
+class FakeArm(Fake):
+    """Stands for the arm's driver."""
+
+    def stop(self) -> None:
+        self._do("stop")
+
+
 @pytest.fixture(autouse=True)
 def fakes(monkeypatch: pytest.MonkeyPatch) -> type[Fake]:
     Fake.log, Fake.fails = [], {}
-    for name in ("arm", "gel", "camera"):
-        monkeypatch.setattr(module, f"make_{name}", lambda _, name=name: Fake(name))
-    monkeypatch.setattr(module, "make_hammer", lambda _: None)
-    monkeypatch.setattr(module, "CAMERAS", {"gel": lambda _: Fake("gel"), "scene": lambda _: None})
+    fakes = {
+        KINDS["ur"].driver: partial(FakeArm, "arm"),
+        KINDS["gelsight-http"].driver: partial(Fake, "gel"),
+        KINDS["camera-http"].driver: partial(Fake, "camera"),
+    }
+    monkeypatch.setattr(section_module, "loaded", fakes.__getitem__)
     return Fake
 
 
@@ -77,9 +85,11 @@ def test_what_does_not_open_is_named_and_the_rest_is_read(
     tmp_path: Path, station: Station, fakes: type[Fake]
 ) -> None:
     fakes.fails = {"arm open": BenchFault("no answer; check the cable"), "camera read": BenchFault("dark")}
-    with open_each(station, scene_of_all(station), context(tmp_path)) as bench:
-        assert bench.arm is None
-        found = checked(bench, station)
+    with open_station(station, scene_of_all(station), context(tmp_path), each=True) as bench:
+        assert bench.find(ARM) is None
+        with pytest.raises(BenchFault, match="no answer; check the cable"):
+            bench.get(ARM)
+        found = check_bench(bench)
     assert [health.name for health in found.instruments] == ["gel"]
     assert {name: str(error) for name, error in found.failures.items()} == {
         "arm": "no answer; check the cable",
@@ -92,9 +102,9 @@ def test_what_does_not_open_is_named_and_the_rest_is_read(
 def test_the_arm_is_stopped_before_anything_closes(
     tmp_path: Path, station: Station, fakes: type[Fake]
 ) -> None:
-    with open_each(station, scene_of_all(station), context(tmp_path)):
+    with open_station(station, scene_of_all(station), context(tmp_path), each=True):
         begun = len(fakes.log)
-    assert fakes.log[begun:] == ["camera close", "gel close", "arm stop", "arm close"]
+    assert fakes.log[begun:] == ["arm stop", "camera close", "gel close", "arm close"]
 
 
 @pytest.mark.parametrize(
@@ -117,17 +127,22 @@ def test_a_check_s_exit_code_is_that_of_the_worst(
 
 
 def test_a_camera_opens_alone(tmp_path: Path, station: Station, fakes: type[Fake]) -> None:
-    with open_camera("gel", station, scene_of_all(station), context(tmp_path)) as camera:
-        camera.read(1, 1.0)
+    with open_station(station, scene_of_all(station), context(tmp_path), only=["gel"]) as bench:
+        bench.gel.read(1, 1.0)
     assert fakes.log == ["gel open", "gel read", "gel close"]
 
 
 @pytest.mark.parametrize(("name", "words"), [("gle", "'gle'.*'gel'"), ("scene", r"\[camera\]")])
 def test_a_camera_that_is_not_there_is_wrong_use(
-    name: str, words: str, tmp_path: Path, station: Station
+    name: str,
+    words: str,
+    tmp_path: Path,
+    station: Station,
+    fakes: type[Fake],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    with (
-        pytest.raises(WrongUse, match=words),
-        open_camera(name, station, scene_of_all(station), context(tmp_path)),
-    ):
-        pass
+    blind = station.model_copy(update={"camera": None})
+    monkeypatch.setattr("harness.bench.station_file.load_station", lambda _: blind)
+    with pytest.raises(WrongUse, match=words):
+        photograph(name, tmp_path / "live.png", "example_bench")
+    assert fakes.log == []
