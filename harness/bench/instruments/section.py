@@ -117,7 +117,7 @@ class InstrumentSection(StrictModel):
         False  #: whether a failure of this instrument ends every motion of the arm.
     )
 
-    kind: str  #: of ``KINDS``.
+    kind: str  #: of instrument.
 
     @property
     def stated_address(self) -> str | None:
