@@ -14,6 +14,8 @@ import pytest
 from harness.bench.acquisition import strike_from_readings
 from harness.bench.acquisition_channels import BLOCK, CLOCK, FORCE, PRESSURE
 from mocks.daq.strike_counts import Wiring, skewed
+from tests.benchmarks.results import finish_figure
+from tests.docs.results import Cell
 from tests.support.daq_bench import (
     CALIBRATION,
     OFFSETS,
@@ -57,13 +59,17 @@ def test_a_minute_of_two_channels_loses_no_sample() -> None:
     wrong = np.count_nonzero((counts != numbered(np.arange(begin, begin + len(counts)))).any(axis=1))
     late = by_name[CLOCK].values[:, 1] * 1e6
     rate = BLOCK * (len(by_name[FORCE].times) - 1) / np.ptp(by_name[FORCE].times)
-    _say(
-        f"{len(counts)} scans of 2 channels at 50 kHz: {wrong} wrong, {lost} bytes lost, {health.drops} drops"
-    )
-    _say(f"crystal {DRIFT_PPM:+.1f} ppm, found {(rate / RATE - 1) * 1e6:+.2f} ppm")
     middle, high = np.percentile(late, [50, 90])
-    _say(f"quickest arrivals after the fit: median {middle:.0f} us, 90 % {high:.0f} us")
-    _say(f"driver: {100 * busy / took:.1f} % of a core over {took:.1f} s")
+    rows: list[tuple[Cell, Cell]] = [
+        (f"scans compared in {SECONDS:g} s", f"{len(counts):,}; {wrong} wrong, {lost} bytes lost"),
+        (
+            f"estimated drift of a crystal {DRIFT_PPM:+.1f} ppm fast [ppm]",
+            float((rate / RATE - 1) * 1e6),
+        ),
+        ("earliest arrivals after the fit, median; 90th percentile", f"{middle:.0f}; {high:.0f} us"),
+        ("CPU use of the driver [% of a core]", 100 * busy / took),
+    ]
+    finish_figure("bench", "acquisition", "quantity; value .3g", rows)
     assert wrong == 0
     assert lost == 0
     assert health.drops == 0

@@ -1,9 +1,8 @@
 """How long the twin takes, and what it misses: ``python tests/benchmarks/bench_twin.py [OBJECT]``.
 
-Prints medians with the middle half of the spread; asserts nothing.
+Prints or writes medians with the middle half of the spread; asserts nothing.
 """
 
-import sys
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -21,9 +20,12 @@ from harness.twin.bench import TwinBench
 from harness.twin.motion import PlannedContact, plan_contact, reachable
 from harness.twin.rehearsal import rehearse
 from harness.twin.sweep import sweep
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 
 HOME = np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])
 T = TypeVar("T")
+Row = tuple[Cell, ...]
 CONTACTS = 7
 MOST_TILT = np.radians(15.0)
 
@@ -38,14 +40,13 @@ def main(name: str) -> None:
         mesh,
         translation(np.array([-0.42, 0.0, 0.25])),
     )
-    say(f"{name}, {len(mesh.faces)} faces, ur5e")
     _ask(bench, 0)  # compiles
-    sites = _reach(bench, mesh)
-    _plans(bench, sites)
-    _alarms(bench)
+    reached, sites = _reach(bench, mesh)
+    rows = [*reached, *_plans(bench, sites), *_alarms(bench)]
+    finish_figure("bench", "twin", f"quantity, {name}, {len(mesh.faces)} faces, ur5e; value", rows)
 
 
-def _reach(bench: TwinBench, mesh: Mesh) -> list[FloatArray]:
+def _reach(bench: TwinBench, mesh: Mesh) -> tuple[list[Row], list[FloatArray]]:
     poses = list(_presses(bench, mesh, 600, np.random.default_rng(0)))
     fits, answers, times = [], [], []
     for pose in poses:
@@ -59,13 +60,18 @@ def _reach(bench: TwinBench, mesh: Mesh) -> list[FloatArray]:
         answers.append(answer)
         times.append(seconds)
     found = np.array(answers)
-    say(f"  tool fits {np.mean(fits):.0%} of places, arm reaches {found.sum() / sum(fits):.0%} of those")
-    say(f"  reachable: {spread(times, 1e3)} ms, 95 % {np.percentile(times, 95) * 1e3:.1f} ms")
-    return [pose for pose, answer in zip(poses, answers, strict=True) if answer]
+    rows: list[Row] = [
+        (
+            "places where the tool fits; of these reached",
+            f"{np.mean(fits):.0%}; {found.sum() / sum(fits):.0%}",
+        ),
+        ("check whether a place is reachable", f"{spread(times, 1e3)} ms"),
+    ]
+    return rows, [pose for pose, answer in zip(poses, answers, strict=True) if answer]
 
 
-def _plans(bench: TwinBench, sites: list[FloatArray]) -> None:
-    planning, rehearsing, failed, segments = [], [], 0, []
+def _plans(bench: TwinBench, sites: list[FloatArray]) -> list[Row]:
+    planning, rehearsing, failed, refused, segments = [], [], 0, 0, []
     for first in range(0, min(len(sites), 10 * CONTACTS), CONTACTS):
         seconds, contacts = timed(partial(_plan, bench, sites[first : first + CONTACTS]))
         planning.append(seconds)
@@ -76,13 +82,13 @@ def _plans(bench: TwinBench, sites: list[FloatArray]) -> None:
         seconds, report = timed(partial(rehearse, bench, plan))
         rehearsing.append(seconds)
         segments.append(len(plan))
-        if report.refusals:
-            say(f"  refused: {report.refusals[0]}")
-    say(
-        f"  planning {CONTACTS} contacts: {spread(planning, 1)} s; "
-        f"{failed} of {len(planning) * CONTACTS} found no way"
-    )
-    say(f"  rehearsing them ({np.median(segments):.0f} motions): {spread(rehearsing, 1e3)} ms")
+        refused += bool(report.refusals)
+    return [
+        (f"planning {CONTACTS} contacts with their paths", f"{spread(planning, 1)} s"),
+        ("contacts without a path", f"{failed} of {len(planning) * CONTACTS}"),
+        (f"rehearsing them, {np.median(segments):.0f} motions", f"{spread(rehearsing, 1e3)} ms"),
+        ("refused by the rehearsal", f"{refused} of {len(planning)}"),
+    ]
 
 
 def _plan(bench: TwinBench, sites: list[FloatArray]) -> list[PlannedContact | None]:
@@ -94,7 +100,7 @@ def _plan(bench: TwinBench, sites: list[FloatArray]) -> list[PlannedContact | No
     return contacts
 
 
-def _alarms(bench: TwinBench, count: int = 150) -> None:
+def _alarms(bench: TwinBench, count: int = 150) -> list[Row]:
     """Against the same question asked every 0.5 mrad."""
     rng = np.random.default_rng(2)
     missed, false, blocked, times = 0, 0, 0, []
@@ -107,10 +113,11 @@ def _alarms(bench: TwinBench, count: int = 150) -> None:
         blocked += truth
         missed += truth and found is None
         false += found is not None and not truth
-    say(
-        f"  {count} random motions, {blocked} blocked: missed {missed}, false alarms {false}; "
-        f"{spread(times, 1e3)} ms"
-    )
+    counts = f"{count}, {blocked} blocked; {missed} missed, {false} false"
+    return [
+        ("motions checked against samples every 0.5 mrad", counts),
+        ("check of a motion", f"{spread(times, 1e3)} ms"),
+    ]
 
 
 def _ask(bench: TwinBench, index: int) -> None:
@@ -147,10 +154,7 @@ def spread(values: list[float], scale: float) -> str:
     return f"{middle:.3g} ({low:.3g} to {high:.3g})"
 
 
-def say(line: str) -> None:
-    """Print a line."""
-    sys.stdout.write(line + "\n")
-
-
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else "mug")
+    parser = benchmark_parser(__doc__)
+    parser.add_argument("object", nargs="?", default="mug")
+    main(parser.parse_args().object)

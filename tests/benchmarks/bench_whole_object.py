@@ -10,7 +10,6 @@ a worst row of each. ``--finer 2`` makes elements half as long as the default: u
 of it on walls and with the cube in solids. Machine code must have been made before: build anything once.
 """
 
-import argparse
 import json
 import tempfile
 import time
@@ -21,7 +20,6 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from harness.authoring.audio.object_audio import MODES, STAGES, AudioRequest, build_audio
 from harness.authoring.audio.profiles import PROFILES
@@ -33,6 +31,8 @@ from harness.objects.household import MATERIALS
 from harness.sim.modal.modal import default_edge
 from harness.sim.modal.stage_seconds import cpu, wall
 from harness.sim.solid.surface_source import surface_of
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 from tests.samples.network_worth import HEADINGS, said, worth
 from tests.support.real_data import WHY_NOT, find_shared_data
 
@@ -88,26 +88,28 @@ def kept(file: Path, names: Sequence[str], chosen: tuple[str, int, float]) -> di
     }
 
 
-def seconds_table(rows: Sequence[dict[str, Any]]) -> Table:
-    """A row an object: of the clock, and of the processor."""
-    table = Table("object", "unknowns", "modes", *STAGES, "all", title="seconds: clock / processor")
+def finish_seconds(rows: Sequence[dict[str, Any]]) -> None:
+    """Print wall and CPU seconds of each stage."""
+    heads = "; ".join(("object", "unknowns", "modes", *STAGES, "all, wall / CPU [s]"))
+    cells: list[list[Cell]] = []
     for row in rows:
         spent = [f"{row['seconds'][stage]:.1f} / {row['cpu_seconds'][stage]:.1f}" for stage in STAGES]
         whole = f"{row['wall_s']:.0f} / {row['cpu_s']:.0f}"
-        table.add_row(row["object"], str(row["unknowns"]), str(row["modes"]), *spent, whole)
-    return table
+        cells.append([row["object"], row["unknowns"], row["modes"], *spent, whole])
+    finish_figure("audionet", "seconds of each stage", heads, cells)
 
 
-def errors_table(rows: Sequence[dict[str, Any]]) -> Table:
-    """Rows of each object, then the mean and the worst of each way over all of them."""
-    table = Table("object", "shapes from", *HEADINGS, title="at vertices that were held out, median of each")
-    for row in rows:
-        for way in WAYS:
-            table.add_row(row["object"], way, *said(worth(row["errors"][way])))
-    for name, over in (("mean", np.nanmean), ("worst", np.nanmax)):
-        for way in WAYS:
-            table.add_row(name, way, *said([_of(over, column) for column in columns(rows, way)]))
-    return table
+def finish_errors(rows: Sequence[dict[str, Any]]) -> None:
+    """Print or write errors at held-out vertices by object, then their mean and worst."""
+    cells: list[list[Cell]] = []
+    for way in WAYS:
+        cells += [[f"{row['object']}, {way}", row["cpu_s"], *said(worth(row["errors"][way]))] for row in rows]
+        for name, over in (("mean", np.nanmean), ("worst", np.nanmax)):
+            cells.append(
+                [f"{name}, {way}", None, *said([_of(over, column) for column in columns(rows, way)])]
+            )
+    heads = ("object, gains from", "mesh to verified file [CPU s] .0f", *HEADINGS)
+    finish_figure("audionet", "objects", "; ".join(heads), cells)
 
 
 def columns(rows: Sequence[dict[str, Any]], way: str) -> Iterator[list[float]]:
@@ -121,14 +123,14 @@ def _of(over: Any, numbers: Sequence[float]) -> float:
 
 def main() -> None:
     """Build what is not there yet; print all that was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("objects", nargs="*")
     parser.add_argument("--profile", default="standard", choices=list(PROFILES))
     parser.add_argument("--modes", type=int, default=MODES)
     parser.add_argument("--finer", type=float, default=1.0)
     parser.add_argument("--out", type=Path, default=Path("whole_objects.jsonl"))
     asked = parser.parse_args()
-    console, data = Console(width=170), find_shared_data()
+    console, data = Console(), find_shared_data()
     known = requests(data, asked.profile, asked.modes)
     names = asked.objects or list(known)
     missing = [name for name in names if name not in known]
@@ -142,8 +144,8 @@ def main() -> None:
                 file.write(json.dumps(done[name]) + "\n")
             console.print(f"{name}: {done[name]['wall_s']:.0f} s, to {asked.out}")
     rows = [done[name] for name in names]
-    console.print(seconds_table(rows))
-    console.print(errors_table(rows))
+    finish_seconds(rows)
+    finish_errors(rows)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ resumes there. What is judged:
   beside those of the cheapest one setting whose error is met in 19 of 20 of them.
 """
 
-import argparse
 import json
 import sys
 from collections.abc import Mapping, Sequence
@@ -39,6 +38,8 @@ from harness.experiment.costing import workers_of
 from harness.experiment.front import Front, front_of
 from harness.experiment.solving import Target
 from harness.experiment.subjects import objects
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell as Entry
 
 SHARE = 0.95
 CONTACTS = 6
@@ -56,7 +57,7 @@ def say(line: str) -> None:
 
 def main() -> None:
     """Measure what is missing, then judge."""
-    parser = argparse.ArgumentParser()
+    parser = benchmark_parser(__doc__)
     parser.add_argument("--spacing", action="append", choices=("close", "spread"))
     parser.add_argument("--yaw", default="known", choices=("known", "unknown"))
     parser.add_argument("--sense", default="both", choices=("touch", "both"))
@@ -70,9 +71,20 @@ def main() -> None:
     curve = load(given.curve or curve_path(PROGRAM))
     seeds = range(given.first_seed, given.first_seed + given.seeds)
     names = given.only or list(objects(None))
+    rows: list[list[Entry]] = []
     for spacing in given.spacing or ("close", "spread"):
         wanted = cells(names, seeds, [spacing], ["default"], [given.yaw], given.sense == "both")
-        say(judged(measured(wanted, curve, given.out, given.workers), f"{spacing}, yaw {given.yaw}"))
+        records = measured(wanted, curve, given.out, given.workers)
+        if not records:
+            say(f"{spacing}: no run could be performed")
+            continue
+        for number, judge in ((len(BUDGETS), judged_budget), (len(ERRORS), judged_error)):
+            rows += [
+                [f"{spacing}, {cell}", *rest] for cell, *rest in (judge(records, k) for k in range(number))
+            ]
+    heads = "condition and request; kept or met; of; refused before or not promised"
+    more = "mean error in mm or CPU time in s; best single setting; ratio to it .2f"
+    finish_figure("localization", "budget", f"{heads}; {more}", rows)
 
 
 def measured(wanted: Sequence[Cell], curve: Curve, folder: Path, workers: int) -> list[Record]:
@@ -160,65 +172,44 @@ def tried_on(records: Sequence[Record]) -> list[Tried]:
     return found
 
 
-def judged(records: Sequence[Record], title: str) -> str:
-    """All lines of one condition."""
-    if not records:
-        return f"{title}: no run could be performed"
-    lines = [f"{title}: {len(records)} runs that the curve has not seen"]
-    lines += [judged_budget(records, index) for index in range(len(BUDGETS))]
-    lines += [judged_error(records, index) for index in range(len(ERRORS))]
-    return "\n".join(lines)
-
-
-def judged_budget(records: Sequence[Record], index: int) -> str:
-    """One line: runs, how many kept it, the errors' means, and the best setting's."""
+def judged_budget(records: Sequence[Record], index: int) -> list[Entry]:
+    """Judge a budget: runs that kept it, the mean error, and the best setting's."""
     budget = BUDGETS[index]
     taken = [record for record in records if not record["budgets"][index]["refused_before"]]
     refused = len(records) - len(taken)
+    name = f"budget {budget:g} s"
     if not taken:
-        return f"  budget {budget:g} s: refused before anything moved in all {refused} runs"
+        return [name, 0, 0, refused, None, None, None]
     ours = [record["budgets"][index] for record in taken]
     kept = sum(answer["wall_s"] <= budget for answer in ours)
-    by_cpu = sum(answer["cpu_s"] <= budget for answer in ours)
     errors = [answer["error_m"] for answer in ours]
     fixed = [t for t in tried_on(taken) if np.mean([s <= budget for s in t.seconds]) >= SHARE]
-    return (
-        f"  budget {budget:g} s: kept in {kept} of {len(ours)} runs ({by_cpu} by CPU time; {refused} refused "
-        f"before); error {1e3 * capped(errors):.2f} mm, plain mean {1e3 * np.mean(errors):.2f}; "
-        + _beside_errors(fixed, errors)
-    )
-
-
-def _beside_errors(fixed: Sequence[Tried], errors: Sequence[float]) -> str:
+    cells: list[Entry] = [name, kept, len(ours), refused, 1e3 * capped(errors)]
     if not fixed:
-        return "no fixed setting keeps it in 19 of 20"
+        return [*cells, "none keeps it in 19 of 20", None]
     best = min(fixed, key=lambda t: capped(t.errors))
-    least = min(float(np.mean(t.errors)) for t in fixed)
-    ratio = capped(errors) / capped(best.errors)
-    return (
-        f"best fixed {1e3 * capped(best.errors):.2f} mm ({best.name}): ratio {ratio:.2f}; "
-        f"by the plain mean {1e3 * least:.2f} mm: ratio {np.mean(errors) / least:.2f}"
-    )
+    return [*cells, best.name, capped(errors) / capped(best.errors)]
 
 
-def judged_error(records: Sequence[Record], index: int) -> str:
-    """One line: runs, how many were promised it, how many met it, seconds, and the cheapest setting's."""
+def judged_error(records: Sequence[Record], index: int) -> list[Entry]:
+    """Judge an error: runs that were promised it and met it, the seconds, and the cheapest setting's."""
     wanted = ERRORS[index]
     ours = [record["errors"][index] for record in records]
     promised = [answer for answer in ours if answer["kept"]]
     met = sum(answer["error_m"] <= wanted for answer in promised)
     seconds = geometric([answer["cpu_s"] for answer in ours])
     fixed = [t for t in tried_on(records) if np.mean([e <= wanted for e in t.errors]) >= SHARE]
-    if fixed:
-        best = min(fixed, key=lambda t: geometric(t.seconds))
-        ratio = seconds / geometric(best.seconds)
-        beside = f"cheapest fixed {geometric(best.seconds):.3f} s ({best.name}): ratio {ratio:.2f}"
-    else:
-        beside = "no fixed setting meets it in 19 of 20"
-    return (
-        f"  error {1e3 * wanted:g} mm: met in {met} of the {len(promised)} runs it was promised to, of "
-        f"{len(ours)}; {seconds:.3f} s; {beside}"
-    )
+    cells: list[Entry] = [
+        f"error {1e3 * wanted:g} mm",
+        met,
+        len(promised),
+        len(ours) - len(promised),
+        seconds,
+    ]
+    if not fixed:
+        return [*cells, "none meets it in 19 of 20", None]
+    best = min(fixed, key=lambda t: geometric(t.seconds))
+    return [*cells, best.name, seconds / geometric(best.seconds)]
 
 
 def geometric(values: Sequence[float]) -> float:

@@ -8,7 +8,6 @@ With ``--replay`` the recordings made before are estimated again, by the estimat
 The data is found as in the tests: TOUCHSTONE_DATA, or ../shared/data.
 """
 
-import argparse
 import json
 import subprocess
 import sys
@@ -20,6 +19,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.support.real_data import WHY_NOT, find_shared_data
 
 PROGRAM = Path(sys.executable).with_name("touchstone")
@@ -151,7 +151,7 @@ def summary(rows: Sequence[Row]) -> dict[str, Any]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Perform, print; 0 where every run ended with 0."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("--out", type=Path, default=Path("runs/real-objects"), help="folder of the runs")
     parser.add_argument("--objects", nargs="+", choices=[*OBJECTS], default=[*OBJECTS])
     parser.add_argument("--seeds", nargs="+", type=int, default=SEEDS)
@@ -169,8 +169,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rows.append(job.replay() if asked.replay else job.perform())
         print(line(rows[-1]), file=told, flush=True)
     total = summary(rows)
-    held = f"{total['in_region90']} of {total['runs']} in the 90 % region, {total['exit_0']} with exit 0"
-    print(json.dumps(total) if asked.json else held)  # noqa: T201
+    if asked.json:
+        print(json.dumps(total))  # noqa: T201
+        return 0 if total["exit_0"] == len(rows) else 1
+    cells = [(f"{r.object}, {r.seed}", r.error_mm, r.symmetric_mm, str(r.in_region), r.modes) for r in rows]
+    heads = "object and seed; error [mm] .1f; modulo symmetry [mm] .1f; in the 90 % region; modes"
+    finish_figure("localization", "wires", heads, cells)
     return 0 if total["exit_0"] == len(rows) else 1
 
 

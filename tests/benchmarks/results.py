@@ -1,9 +1,11 @@
 """Figures of benchmarks: printed as a table, or written into docs/results/data.
 
-A script writes them with ``--write``, a benchmark of pytest with the environment's ``WRITE_RESULTS=1``. Then
-``make results`` renders the pages.
+A script writes them with ``--write``, a benchmark of pytest with the environment's ``WRITE_RESULTS=1``. The
+rows of ``touchstone tables EXPERIMENT --json > FILE`` are written by ``python -m tests.benchmarks.results
+PAGE FIGURE FILE --command "touchstone tables EXPERIMENT" --write``. Then ``make results`` renders the pages.
 """
 
+import json
 import os
 import platform
 import re
@@ -24,6 +26,7 @@ from tests.docs.results import Cell, Column, Spread, read_page, show_cell, write
 
 ROOT = Path(__file__).parents[2]
 WRITE = "--write"
+NUMBER = r"([+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?)"
 
 
 def benchmark_parser(description: str | None) -> ArgumentParser:
@@ -39,7 +42,9 @@ def spread(values: ArrayLike, low: float = 0.0, high: float = 1.0) -> Spread:
     return Spread(value=float(middle), low=float(least), high=float(most))
 
 
-def finish_figure(page: str, figure: str, columns: str, rows: Iterable[Sequence[Cell]]) -> None:
+def finish_figure(
+    page: str, figure: str, columns: str, rows: Iterable[Sequence[Cell]], command: str = ""
+) -> None:
     """Print a figure, or replace the figure of the same name on its page.
 
     Args:
@@ -47,7 +52,9 @@ def finish_figure(page: str, figure: str, columns: str, rows: Iterable[Sequence[
         figure: its ``id`` there; title, conclusion and source are kept. Printed if the page has none.
         columns: heads separated by ``;``, each a name, its unit in brackets if it has one and the format of
             its floats if it is not ``.3g``: ``case; time [s] .2f``.
-        rows: one entry for each column. Floats are rounded to the column's format.
+        rows: one entry for each column. Floats are rounded to the column's format; text that is a number, or
+            one with its extremes as ``1.6 (1.5 to 1.7)``, is kept as numbers.
+        command: line that measured the rows; this program's own by default.
     """
     heads = tuple(_column(text) for text in columns.split(";"))
     formats = [head.format or ".3g" for head in heads]
@@ -63,7 +70,7 @@ def finish_figure(page: str, figure: str, columns: str, rows: Iterable[Sequence[
     update = {
         "columns": heads,
         "rows": kept,
-        "command": _command(),
+        "command": command or _command(),
         "commit": _git("describe", "--always", "--dirty", "--exclude=*"),
         "date": datetime.now(UTC).date().isoformat(),
         "machine": _machine(),
@@ -73,16 +80,21 @@ def finish_figure(page: str, figure: str, columns: str, rows: Iterable[Sequence[
 
 
 def _column(text: str) -> Column:
-    found = re.fullmatch(r"\s*(.*?)(?: \[(.*)\])?(?: (#?\+?\.\d[efg%]))?\s*", text)
+    found = re.fullmatch(r"\s*(.*?)(?: \[(.*)\])?(?: (#?\+?\.\d[efg]))?\s*", text)
     assert found is not None
     return Column(name=found[1], unit=found[2] or "", format=found[3] or "")
 
 
 def _round(cell: Cell, spec: str) -> Cell:
+    if isinstance(cell, str) and (found := re.fullmatch(rf"{NUMBER}(?: \({NUMBER} to {NUMBER}\))?", cell)):
+        values = [int(text) if text.isdigit() else float(text) for text in found.groups() if text]
+        return Spread(value=values[0], low=values[1], high=values[2]) if len(values) > 1 else values[0]
     if isinstance(cell, Spread):
         value, low, high = (float(f"{each:{spec}}") for each in (cell.value, cell.low, cell.high))
         return Spread(value=value, low=low, high=high)
-    return float(f"{cell:{spec}}") if isinstance(cell, float) else cell
+    if isinstance(cell, float):
+        return float(f"{cell:{spec}}") if np.isfinite(cell) else None
+    return cell
 
 
 def _command() -> str:
@@ -103,3 +115,27 @@ def _machine() -> str:
     model = told[1] if told else platform.machine()
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     return f"{model}, {os.cpu_count()} cores, {memory:.0f} GB, Python {platform.python_version()}"
+
+
+def main() -> None:
+    """Print or write the rows that ``touchstone tables`` of an experiment printed as JSON."""
+    parser = benchmark_parser(__doc__)
+    parser.add_argument("page")
+    parser.add_argument("figure")
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--command", required=True)
+    given = parser.parse_args()
+    rows = []
+    for row in json.loads(given.file.read_text(encoding="utf-8"))["rows"]:
+        median, mean, gross = (each["value"] for each in row["raw"])
+        conditions = [value for key in ("spacing", "yaw", "gap", "shape", "look") if (value := row.get(key))]
+        held = None if row["held"] is None else 100.0 * row["held"]
+        name = ", ".join([row["method"], *conditions])
+        rows.append([name, row["runs"], row["refused"], 1e3 * median, 1e3 * mean, 100.0 * gross, held])
+    heads = "method and condition; runs; refused; median error [mm] .1f; mean error [mm] .1f"
+    gross_and_held = "above the limit [%] .1f; region holds [%] .1f"
+    finish_figure(given.page, given.figure, f"{heads}; {gross_and_held}", rows, given.command)
+
+
+if __name__ == "__main__":
+    main()

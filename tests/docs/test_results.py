@@ -1,11 +1,15 @@
 """docs/results is rendered from its JSON, states where each figure comes from, and stays short."""
 
 import re
+import sys
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
-from tests.docs.results import DATA, FOLDER, pages, read_page
+from tests.benchmarks.results import finish_figure
+from tests.docs import results
+from tests.docs.results import DATA, FOLDER, Spread, pages, read_page
 
 ROOT = FOLDER.parents[1]
 PAGES = pages()
@@ -45,6 +49,20 @@ def test_benchmarks_write_figures_that_are_there() -> None:
     }
     assert written
     assert written <= {(name, figure.id) for name in NAMES for figure in read_page(name).figures}
+
+
+def test_a_benchmark_replaces_its_figure_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(results, "DATA", tmp_path)
+    (tmp_path / "modes.json").write_text((DATA / "modes.json").read_text(encoding="utf-8"))
+    before = read_page("modes").figures
+    monkeypatch.setattr(sys, "argv", ["benchmark.py", "--write"])
+    finish_figure("modes", "filling", "program; time [CPU s] .1f; cells", [("ours", "9.9 (9 to 11.2)", 7.04)])
+    after = read_page("modes").figures
+    (number,) = [k for k, (old, new) in enumerate(zip(before, after, strict=True)) if old != new]
+    assert after[number].rows == (("ours", Spread(value=9.9, low=9, high=11.2), 7.04),)
+    assert after[number].title == before[number].title
+    assert after[number].commit != before[number].commit
+    assert "ours | 9.9 (9 to 11.2) | 7.04" in pages()["modes.md"]
 
 
 def test_results_and_limits_are_short() -> None:

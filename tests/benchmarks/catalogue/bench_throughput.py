@@ -5,7 +5,6 @@ procedural objects in the smallest profile by one worker and by two, half and a 
 thousand rows that share a mesh twice. It needs both cores: say what else ran.
 """
 
-import argparse
 import json
 import os
 import shutil
@@ -19,13 +18,14 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from tests.benchmarks.catalogue.drawn_catalogue import answer, write_catalogue
+from tests.benchmarks.results import benchmark_parser, finish_figure
 
 ROWS = 1000
 
 
 def main() -> None:
-    """Run it and print one JSON object."""
-    parser = argparse.ArgumentParser()
+    """Build, and print or write the figure."""
+    parser = benchmark_parser(__doc__)
     parser.add_argument("--objects", type=int, default=30)
     parser.add_argument("--senses", default="touch")
     arguments = parser.parse_args()
@@ -38,19 +38,26 @@ def main() -> None:
     pair = seconds(folder, arguments.objects, 2, more)
     slope, start = np.polyfit(counts, [alone[count] for count in counts], 1)
     own = {count: object_seconds(folder / f"out-{count}-1") for count in counts}
-    result = {
-        "load_before": load,
-        "seconds_one_worker": alone,
-        "seconds_two_workers": pair,
-        "objects_per_hour": [3600 * arguments.objects / took for took in (alone[arguments.objects], pair)],
-        "efficiency_2": alone[arguments.objects] / (2 * pair),
-        "exponent_of_a_build": exponent(alone),
-        "exponent_of_its_objects": exponent(own),
-        "start_s": float(start),
-        "projected_1000_objects_h_2_workers": 1000 * slope / 3600 * pair / alone[arguments.objects],
-        "thousand_rows": thousand(folder),
-    }
-    print(json.dumps(result))  # noqa: T201
+    whole, rows = alone[arguments.objects], thousand(folder)
+    finish_figure(
+        "catalogue",
+        "throughput",
+        f"quantity, profile smoke, {arguments.senses}, load {load[0]:.1f}; value .3g",
+        [
+            ("objects per hour, one worker", 3600 * arguments.objects / whole),
+            ("objects per hour, two workers", 3600 * arguments.objects / pair),
+            ("efficiency of two workers", whole / (2 * pair)),
+            (f"growth exponent, {', '.join(map(str, counts))} objects", exponent(own)),
+            ("the same with the program's start", exponent(alone)),
+            ("the program's start [s]", float(start)),
+            (
+                "projected wall time of 1,000 objects, two workers [h]",
+                float(1000 * slope / 3600 * pair / whole),
+            ),
+            (f"first build of {ROWS:,} rows of one mesh [s]", rows["first"]),
+            (f"second build of {ROWS:,} unchanged rows [s]", rows["second"]),
+        ],
+    )
     shutil.rmtree(folder)
 
 

@@ -7,8 +7,6 @@ build is then begun again. Both must have the same bits, each made once. Tetrahe
 build to the second, since fTetWild would fill otherwise; nothing else is.
 """
 
-import argparse
-import json
 import os
 import shutil
 import signal
@@ -18,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
@@ -29,11 +28,12 @@ from tests.benchmarks.catalogue.drawn_catalogue import (
     times_made,
     write_catalogue,
 )
+from tests.benchmarks.results import benchmark_parser, finish_figure
 
 
 def main() -> None:
-    """Run it and print one JSON object."""
-    parser = argparse.ArgumentParser()
+    """Build twice, and print or write the figure."""
+    parser = benchmark_parser(__doc__)
     parser.add_argument("--objects", type=int, default=30)
     parser.add_argument("--senses", default="touch")
     parser.add_argument("--edge", default="15mm")
@@ -45,21 +45,30 @@ def main() -> None:
     if (folder / "local/stages/arrays").is_dir():
         shutil.copytree(folder / "local/stages/arrays", folder / "ray/stages/arrays")
     ray = by_ray(catalogue, folder / "ray", arguments.objects, more)
-    made = times_made(folder / "ray")
-    result = {
-        "objects": arguments.objects,
-        "local": {key: local[key] for key in ("built", "failed", "seconds")},
-        "ray": ray,
-        "files": len(hashes(folder / "local")),
-        "identical": hashes(folder / "local") == hashes(folder / "ray"),
-        "senses_made": len(made),
-        "made_more_than_once": [key for key, times in made.items() if times > 1],
-    }
-    print(json.dumps(result))  # noqa: T201
+    made, ours, theirs = times_made(folder / "ray"), hashes(folder / "local"), hashes(folder / "ray")
+    twice = sum(times > 1 for times in made.values())
+    differ = sum(ours.get(name) != theirs.get(name) for name in {*ours, *theirs})
+    finish_figure(
+        "catalogue",
+        "faults",
+        f"quantity, profile smoke, {arguments.senses}, {arguments.objects} objects and one broken mesh; "
+        "local runner; Ray, one node and the driver killed, then restarted",
+        [
+            ("objects built by the last call", local["built"], f"{ray['built']}; {ray['standing']} existed"),
+            ("broken meshes", str(local["failed"]), str(ray["failed"])),
+            ("wall time [s]", local["seconds"], ray["seconds"]),
+            (
+                "files that differ between the runners",
+                f"{differ} of {len(ours)}",
+                f"{differ} of {len(theirs)}",
+            ),
+            ("senses built; more than once", None, f"{len(made)}; {twice}"),
+        ],
+    )
     shutil.rmtree(folder)
 
 
-def by_ray(catalogue: Path, out: Path, objects: int, more: tuple[str, ...]) -> dict[str, object]:
+def by_ray(catalogue: Path, out: Path, objects: int, more: tuple[str, ...]) -> dict[str, Any]:
     """Three nodes, of which one is killed; two drivers, of which the first is."""
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
     from ray.cluster_utils import Cluster
@@ -72,15 +81,11 @@ def by_ray(catalogue: Path, out: Path, objects: int, more: tuple[str, ...]) -> d
         with subprocess.Popen(command(catalogue, out, *more), stdout=subprocess.DEVNULL) as driver:
             until(lambda: built(out) >= objects // 3, driver)
             cluster.remove_node(nodes[0], allow_graceful=False)
-            at_node = built(out)
             until(lambda: built(out) >= 2 * objects // 3, driver)
             driver.send_signal(signal.SIGKILL)
-        at_driver = built(out)
-        again = answer(catalogue, out, *more)
+        return answer(catalogue, out, *more)
     finally:
         cluster.shutdown()
-    answered = {key: again[key] for key in ("standing", "built", "failed", "seconds")}
-    return {"built_at_node_loss": at_node, "built_at_driver_loss": at_driver, "second_driver": answered}
 
 
 def until(true: Callable[[], bool], driver: subprocess.Popen[bytes], longest: float = 1800.0) -> None:

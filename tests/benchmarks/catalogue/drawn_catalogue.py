@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -43,10 +44,10 @@ def command(catalogue: Path, out: Path, *more: str) -> list[str]:
     return [program, "catalogue", "build", str(catalogue), *arguments]
 
 
-def answer(catalogue: Path, out: Path, *more: str) -> dict[str, object]:
+def answer(catalogue: Path, out: Path, *more: str) -> dict[str, Any]:
     """What a build that runs to its end says."""
     done = subprocess.run(command(catalogue, out, *more), stdout=subprocess.PIPE, check=False)
-    found: dict[str, object] = json.loads(done.stdout)
+    found: dict[str, Any] = json.loads(done.stdout)
     return found
 
 

@@ -8,7 +8,6 @@ revolution that is turned about its axis is not moved; it is left out of that ro
 to solve for the modes of its mocked truth takes two minutes a run. Seconds are of CPU.
 """
 
-import argparse
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -18,7 +17,6 @@ from time import process_time
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from experiments.contact_localization.accuracy.benchmark_runs import cells, scene_of
 from experiments.contact_localization.experiment import EXPERIMENT
@@ -33,6 +31,8 @@ from harness.experiment.in_process import recorded
 from harness.objects.household import MATERIALS, build
 from harness.recording.run_folder import RunFiles
 from harness.sim.optics.tactile_calibration import TactileCalibration
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 
 OBJECTS = tuple(MATERIALS)
 ROUND = ("bowl", "plate")
@@ -170,37 +170,34 @@ def rows(
                 yield known.row(case, run, partial(subject_of, run, cell.seed))
 
 
-def table_of(found: Sequence[ComparedRun]) -> Table:
-    """A row for each case: runs, those in doubt, and the senses that are; medians of seconds."""
-    headings = (f"{sense} in doubt" for sense in SENSES)
-    table = Table("case", "runs", "in doubt", *headings, "CPU s, median, most")
+def finish_cases(found: Sequence[ComparedRun]) -> None:
+    """Print or write a row for each case: runs, those in doubt, and the senses that are; median seconds."""
+    cells: list[list[Cell]] = []
     for case in (*CASES, MICROPHONE):
         of = [row for row in found if row.case == case]
         if of:
             doubted = [sum(sense in row.doubts for row in of) for sense in SENSES]
             seconds = np.array([row.seconds for row in of])
-            numbers = [f"{len(of)}", _share(sum(bool(row.doubts) for row in of), len(of))]
-            spent = f"{np.median(seconds):.1f}, {seconds.max():.1f}"
-            table.add_row(case, *numbers, *(f"{count}" for count in doubted), spent)
-    return table
+            doubts = sum(bool(row.doubts) for row in of)
+            cells.append([case, len(of), doubts, *doubted, float(np.median(seconds))])
+    heads = "; ".join(f"by {sense}" for sense in SENSES)
+    finish_figure(
+        "objectfile", "agreement", f"case; runs; in doubt; {heads}; time, median [CPU s] .1f", cells
+    )
 
 
-def objects_of(found: Sequence[ComparedRun]) -> Table:
-    """Runs in doubt of each object, of how many."""
-    table = Table("in doubt", *OBJECTS)
+def finish_objects(found: Sequence[ComparedRun]) -> None:
+    """Print the runs in doubt of each object, of how many."""
+    cells = []
     for case in (*CASES, MICROPHONE):
         of = {name: [row for row in found if (row.case, row.object) == (case, name)] for name in OBJECTS}
-        table.add_row(case, *(f"{sum(bool(r.doubts) for r in each)} of {len(each)}" for each in of.values()))
-    return table
-
-
-def _share(count: int, of: int) -> str:
-    return f"{count} ({100.0 * count / of:.0f} %)"
+        cells.append([case, *(f"{sum(bool(r.doubts) for r in each)} of {len(each)}" for each in of.values())])
+    finish_figure("objectfile", "agreement by object", "; ".join(("in doubt", *OBJECTS)), cells)
 
 
 def main() -> None:
     """Perform what is not there, compare, and print."""
-    options = argparse.ArgumentParser(description=__doc__)
+    options = benchmark_parser(__doc__)
     options.add_argument("recordings", type=Path)
     options.add_argument("--seeds", type=int, default=10)
     options.add_argument("--first-seed", type=int, default=6001)
@@ -217,7 +214,9 @@ def main() -> None:
             found.append(row)
             shown = row.sentences if bool(row.doubts) == row.case.startswith("right") else ()
             console.print(f"{row.case}, {row.object}: {', '.join(row.doubts) or 'fits'}", *shown, sep="\n  ")
-        console.print(f"to seed {seed}", table_of(found), objects_of(found))
+        console.print(f"to seed {seed}")
+        finish_cases(found)
+        finish_objects(found)
 
 
 if __name__ == "__main__":

@@ -5,8 +5,6 @@ ten contacts of each mesh and seed, 10 s a run; the recordings are kept and answ
 The meshes are read from TOUCHSTONE_DATA or ../shared/data.
 """
 
-import argparse
-import sys
 from collections import defaultdict
 from contextlib import closing
 from pathlib import Path
@@ -25,6 +23,8 @@ from harness.experiment.lookup import named
 from harness.experiment.plain import perform_in_process
 from harness.experiment.truth import read_truth
 from harness.recording.run_folder import RunFiles
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 from tests.support.real_data import find_shared_data
 
 MESHES = {
@@ -42,7 +42,7 @@ Row = tuple[float, float, float]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--first-seed", type=int, default=3000)
     parser.add_argument("--recordings", type=Path, default=None)
@@ -57,8 +57,9 @@ def main() -> None:
             found = answer_run(ScaleCell(name, "unplaced", seed, "yes"), scene, station, options.recordings)
             for sense, row in found.items():
                 rows[sense].append(row)
-    for sense, found_rows in rows.items():
-        sys.stdout.write(f"{sense:8} {describe_rows(found_rows)}\n")
+    cells = [count_rows(sense, found) for sense, found in rows.items()]
+    heads = "sense; held; intervals; too small; too large; mean error [%] .2f; mean absolute error [%] .2f"
+    finish_figure("scale", "unseen", heads, cells)
 
 
 def answer_run(
@@ -99,14 +100,12 @@ def compare_with(belief: Belief, true: float) -> Row:
     return float(median), float(low), float(high)
 
 
-def describe_rows(rows: list[Row]) -> str:
+def count_rows(sense: str, rows: list[Row]) -> list[Cell]:
     """Count the intervals that hold, and the misses on each side."""
     medians, lows, highs = np.array(rows).T
     small, large = int((highs < 0.0).sum()), int((lows > 0.0).sum())
-    return (
-        f"held {len(rows) - small - large} of {len(rows)}, {small} too small, {large} too large; error "
-        f"{medians.mean():+.2f} % on average, {np.abs(medians).mean():.2f} % absolute"
-    )
+    errors = float(medians.mean()), float(np.abs(medians).mean())
+    return [sense, len(rows) - small - large, len(rows), small, large, *errors]
 
 
 if __name__ == "__main__":

@@ -4,8 +4,6 @@ Run as ``PYTHONPATH=. python tests/benchmarks/scale/bench_looks.py [--seeds 10] 
 [--gap unplaced]``; a second a look. The real meshes are taken from TOUCHSTONE_DATA or ../shared/data.
 """
 
-import argparse
-import sys
 from contextlib import closing, suppress
 
 import numpy as np
@@ -25,26 +23,30 @@ from harness.experiment.subjects import objects
 from harness.experiment.truth import read_truth
 from harness.picture.outline import SeenOutline
 from harness.recording.run_folder import RunFiles
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 from tests.support.real_data import find_shared_data
 
+METHODS = ("shape known", "shape unknown", "box")
 Row = dict[str, tuple[float, bool]]
 """Error in cm by method, and whether the interval holds the truth."""
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--first-seed", type=int, default=2000)
     parser.add_argument("--gap", default="unplaced")
     asked = parser.parse_args()
-    station, rows = load_station(station_path("mock")), list[Row]()
+    station, rows, table = load_station(station_path("mock")), list[Row](), list[list[Cell]]()
     for name, scene in objects(find_shared_data()).items():
         cells = [ScaleCell(name, asked.gap, asked.first_seed + seed, "yes") for seed in range(asked.seeds)]
         mine = [look(cell, scene, station) for cell in cells]
         rows += mine
-        sys.stdout.write(f"{name:10} {said(mine)}\n")
-        sys.stdout.flush()
-    sys.stdout.write(f"{'all':10} {said(rows)}\n")
+        table.append([name, *summarize(mine)])
+    table.append([f"all, gap {asked.gap}", *summarize(rows)])
+    parts = (f"{method}: answered; median [cm] .2f; mean [cm] .2f; held [%] .0f" for method in METHODS)
+    finish_figure("scale", "gaps", "; ".join(("object", *parts)), table)
 
 
 def look(cell: ScaleCell, scene: SceneFile, station: Station) -> Row:
@@ -76,17 +78,18 @@ def scored(belief: Belief, true: float) -> tuple[float, bool]:
     return 1e2 * abs(belief.size - true), bool(low <= true <= high)
 
 
-def said(rows: list[Row]) -> str:
-    parts = []
-    for method in ("shape known", "shape unknown", "box"):
+def summarize(rows: list[Row]) -> list[Cell]:
+    """Summarize the errors of each method; the outline's box states no interval."""
+    cells: list[Cell] = []
+    for method in METHODS:
         found = [row[method] for row in rows if method in row]
-        if not found:
-            parts.append(f"{method}: refused")
-            continue
         errors, held = np.array([error for error, _ in found]), np.mean([inside for _, inside in found])
-        claim = "" if method == "box" else f", held {100 * held:.0f} %"
-        parts.append(f"{method}: {np.median(errors):.2f} / {errors.mean():.2f} cm{claim} ({len(found)})")
-    return "; ".join(parts) + f" ({len(rows)} looks)"
+        if not found:
+            cells += [0, None, None, None]
+            continue
+        claim = None if method == "box" else 100.0 * float(held)
+        cells += [len(found), float(np.median(errors)), float(errors.mean()), claim]
+    return cells
 
 
 if __name__ == "__main__":

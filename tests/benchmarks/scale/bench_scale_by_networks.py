@@ -8,14 +8,12 @@ of the longest side in mm, a refused answer counted as the middle of the range; 
 holds; seconds.
 """
 
-import argparse
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.scale_estimation.cells import ScaleCell, scene_of
@@ -30,6 +28,8 @@ from harness.experiment.lookup import named
 from harness.experiment.plain import perform_in_process
 from harness.experiment.truth import read_truth
 from harness.recording.run_folder import RunFiles
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 
 LEVELS = ("elements", "network")
 
@@ -69,31 +69,32 @@ def answered(cell: ScaleCell, scene: SceneFile, station: Station) -> Iterator[An
                 yield AnsweredSize(level, sense, abs(belief.size - size), inside, seconds)
 
 
-def table_of(rows: dict[str, list[AnsweredSize]]) -> Table:
-    """By object and sense: elements / network."""
-    table = Table("object", "sense", "runs", "errors, mm", "mean, mm", "of means", "in interval", "s")
+def finish_objects(rows: dict[str, list[AnsweredSize]]) -> None:
+    """Print or write by object and sense: elements / network."""
+    table: list[tuple[Cell, ...]] = []
     for name, of in {**rows, "all": [row for each in rows.values() for row in each]}.items():
         for sense in ("audio", "fused"):
             parts = [[row for row in of if (row.level, row.sense) == (level, sense)] for level in LEVELS]
             errors = [[1e3 * row.error for row in part] for part in parts]
             means = [float(np.mean(each)) for each in errors]
             listed = " / ".join(", ".join(f"{error:.2f}" for error in each) for each in errors)
-            table.add_row(
-                name,
-                sense,
-                f"{len(parts[0])}",
-                "" if name == "all" else listed,
+            cells = (
+                f"{name}, {sense}",
+                len(parts[0]),
+                None if name == "all" else listed,
                 " / ".join(f"{mean:.2f}" for mean in means),
-                f"{means[1] / means[0]:.2f}",
+                means[1] / means[0],
                 " / ".join(f"{sum(row.inside for row in part)}" for part in parts),
                 " / ".join(f"{np.mean([row.seconds for row in part]):.2f}" for part in parts),
             )
-    return table
+            table.append(cells)
+    heads = "object and sense: elements / network; runs; errors [mm]; mean [mm]; ratio of means .2f"
+    finish_figure("objectfile", "scale", f"{heads}; in the interval; time [s]", table)
 
 
 def main() -> None:
     """Perform, answer, and print a table."""
-    options = argparse.ArgumentParser(description=__doc__)
+    options = benchmark_parser(__doc__)
     options.add_argument("objects", nargs="+")
     options.add_argument("--seeds", type=int, default=4)
     options.add_argument("--first-seed", type=int, default=0)
@@ -105,7 +106,7 @@ def main() -> None:
             cell = ScaleCell(scene.object.name, "unplaced", seed, "yes")
             rows.setdefault(cell.object, []).extend(answered(cell, scene, station))
             Console(stderr=True).print(f"{cell.name} answered")
-    Console(width=160).print(table_of(rows))
+    finish_objects(rows)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ a bench opens an object once. On one core. The error is that of the sound beside
 in double precision, term by term.
 """
 
-import argparse
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,8 +15,6 @@ from pathlib import Path
 
 import numpy as np
 from onnx import ModelProto
-from rich.console import Console
-from rich.table import Table
 from threadpoolctl import threadpool_limits
 
 from harness.authoring.audio.audio import waves_graph
@@ -30,6 +27,7 @@ from harness.objectfile.audio.blow import HammerBlow
 from harness.objectfile.audio.part import AudioPart, with_audio
 from harness.objectfile.audio.strike import Place, place_of_vertex, strike
 from harness.objectfile.file import create_object
+from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.oracles.summed_modes import COUNTS, DURATION, RATE, RATES, Case, case, error, outer, said, timed
 from tests.samples.object_bench import PROVENANCE, egg, egg_modes
 
@@ -86,20 +84,22 @@ def rows(modes: int, profile: str, repeats: int) -> Iterator[list[str]]:
 
 def main() -> None:
     """Measure what the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("modes", type=int, nargs="*", default=COUNTS)
     parser.add_argument("--profile", action="append", choices=list(PROFILES))
     parser.add_argument("--repeats", type=int, default=30)
     asked = parser.parse_args()
-    table = Table(title=f"{DURATION:g} s at {RATE / 1e3:g} kHz, one core, ms: median (least to greatest)")
-    for heading in ("modes", "network", "process time", "clock", "gains of it", "error dB", "stated dB"):
-        table.add_column(heading)
+    heads = (
+        "modes; network profile; CPU time [ms]; wall time [ms]; network alone [ms]; error [dB]; stated [dB]"
+    )
     with threadpool_limits(limits=1):
-        for modes in asked.modes:
-            for profile in asked.profile or ["standard"]:
-                for each in rows(modes, profile, asked.repeats):
-                    table.add_row(*each)
-    Console(width=150).print(table)
+        every = [
+            each
+            for modes in asked.modes
+            for profile in asked.profile or ["standard"]
+            for each in rows(modes, profile, asked.repeats)
+        ]
+    finish_figure("audionet", "strike", heads, every)
 
 
 if __name__ == "__main__":

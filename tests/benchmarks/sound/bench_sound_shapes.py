@@ -7,7 +7,6 @@ stands
 beside: no level can be nearer than that. Without a folder an ObjectFile is built, and its seconds said.
 """
 
-import argparse
 import tempfile
 import time
 from collections.abc import Mapping
@@ -17,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 from threadpoolctl import threadpool_limits
 
 from harness.authoring.audio.object_audio import AudioRequest, build_audio
@@ -37,6 +35,8 @@ from harness.objectfile.surface_search import SurfaceSearch
 from harness.objects.household import MATERIALS as MADE_OF
 from harness.sim.modal.modal import from_arrays
 from harness.sim.modal.modes import Modes
+from tests.benchmarks.results import benchmark_parser, finish_figure, spread
+from tests.docs.results import Cell
 
 PLACES = 400
 _READINGS = 21
@@ -46,7 +46,7 @@ NEAR = 0.03
 
 def main() -> None:
     """Print one table."""
-    parser = argparse.ArgumentParser()
+    parser = benchmark_parser(__doc__)
     parser.add_argument("object", nargs="?", default="mug", choices=list(MADE_OF))
     parser.add_argument("--objectfile", type=Path)
     parser.add_argument("--repeat", type=int, default=3)
@@ -85,14 +85,14 @@ def _print(scene: SceneFile, repeat: int) -> None:
     found["elements"] = [*seconds, stored[0][0]], [*modes, stored[1][0]]
     found["elements, kept"] = stored[0][1:], stored[1][1:]
     fresh = found["elements"][1]
-    heads = ("modes from", "first, s", "then, s (least to most)", "frequency, %", "shapes, %", "95th")
-    title = f"{scene.object.name}: {len(fresh[0].frequencies)} modes at {len(fresh[0].points)} nodes"
-    table = Table(*heads, title=f"{title}; beside {len(fresh)} fresh solutions")
+    heads = "modes from; first [CPU s] .3f; again: median (extremes) [CPU s] .3f; frequency, largest [%]"
+    rows = []
     for level, (seconds, modes) in found.items():
         solved = level.startswith("elements")
         pairs = list(combinations(fresh, 2)) if solved else [(modes[-1], each) for each in fresh]
-        table.add_row(level, f"{seconds[0]:.3f}", _spread(seconds[1:]), *_differences(pairs, mesh))
-    Console(width=140).print(table)
+        again = spread(seconds[1:]) if len(seconds) > 1 else None
+        rows.append([f"{scene.object.name}, {level}", seconds[0], again, *_differences(pairs, mesh)])
+    finish_figure("objectfile", "modes", f"{heads}; shape, median [%]; shape, 95th percentile [%]", rows)
 
 
 def _taken(
@@ -112,15 +112,9 @@ def _taken(
     return seconds, modes
 
 
-def _spread(seconds: list[float]) -> str:
-    if not seconds:
-        return ""
-    return f"{np.median(seconds):.3f} ({min(seconds):.3f} to {max(seconds):.3f})"
-
-
-def _differences(pairs: list[tuple[Modes, Modes]], mesh: Mesh) -> tuple[str, str, str]:
+def _differences(pairs: list[tuple[Modes, Modes]], mesh: Mesh) -> tuple[Cell, Cell, Cell]:
     if not pairs:
-        return "", "", ""
+        return None, None, None
     points, _ = SurfaceSearch(mesh).spread(PLACES, seed=7)
     frequencies, shapes = [], []
     for one, other in pairs:
@@ -129,7 +123,7 @@ def _differences(pairs: list[tuple[Modes, Modes]], mesh: Mesh) -> tuple[str, str
         shapes.append(_unexplained(one, other, points))
     every = np.concatenate(shapes)
     middle, high = np.median(every), np.quantile(every, 0.95)
-    return f"{1e2 * max(frequencies):.2g}", f"{1e2 * middle:.2g}", f"{1e2 * high:.2g}"
+    return 1e2 * float(max(frequencies)), 1e2 * float(middle), 1e2 * float(high)
 
 
 def _unexplained(one: Modes, other: Modes, points: FloatArray) -> FloatArray:

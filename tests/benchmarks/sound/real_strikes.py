@@ -8,9 +8,8 @@ responses with what was found in them.
 The data is found as in the tests: TOUCHSTONE_DATA, or ../shared/data.
 """
 
-import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -18,7 +17,6 @@ from typing import TypeVar
 import numpy as np
 from matplotlib.axes import Axes
 from rich.console import Console
-from rich.table import Table
 from scipy.interpolate import CubicSpline
 
 from harness.basics.arrays import FloatArray
@@ -26,6 +24,8 @@ from harness.report.figures.style import ANSWER, SOFT, TOOL, blank, styled
 from harness.strikes.frequency_response import frequency_response, measure_blow
 from harness.strikes.modal_identification import Identified, IdentifiedMode, modes_of_decay, modes_of_response
 from harness.strikes.pole_fit import ComplexArray, PoleSearch
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 from tests.oracles.measured_beams import (
     HAMMER_RATE,
     RULER_STEP,
@@ -49,22 +49,14 @@ STRONG = -40.0
 PLACES = np.linspace(0.0, 1.0, 10)
 
 
-def timed(title: str, work: Callable[[], _Result]) -> tuple[_Result, str]:
-    """The result, and the title with its process seconds."""
+def timed(work: Callable[[], _Result]) -> tuple[_Result, float]:
+    """Return the result and its CPU seconds."""
     begun = time.process_time()
     result = work()
-    return result, f"{title}: {time.process_time() - begun:.2f} s of process time"
+    return result, time.process_time() - begun
 
 
-def table(title: str, headings: str) -> Table:
-    """With headings between bars."""
-    made = Table(title=title)
-    for heading in headings.split("|"):
-        made.add_column(heading, justify="right")
-    return made
-
-
-def told(mode: IdentifiedMode) -> list[str]:
+def told(mode: IdentifiedMode) -> list[Cell]:
     """Frequency, damping and level."""
     return [
         f"{mode.frequency:.3f} ± {mode.frequency_sigma:.3f}",
@@ -73,75 +65,68 @@ def told(mode: IdentifiedMode) -> list[str]:
     ]
 
 
-def against_theory(mode: IdentifiedMode, first: IdentifiedMode, number: int, step: float) -> list[str]:
+def against_theory(mode: IdentifiedMode, first: IdentifiedMode, number: int, step: float) -> list[Cell]:
     """Ratio to the first, a free beam's, how far off, and how far the lines tell."""
     ratio, theory = mode.frequency / first.frequency, float(beam_ratios("free-free", number + 1)[number])
     known = 0.5 * step * (1.0 / mode.frequency + 1.0 / first.frequency)
     return [f"{ratio:.4f}", f"{theory:.4f}", f"{100 * (ratio / theory - 1):+.2f}", f"{100 * known:.2f}"]
 
 
-def beam_table(title: str, found: Identified) -> Table:
-    """Of the suspended beam."""
-    made = table(title, "Hz|damping %|dB|over the first|free beam|off by %|lines tell %")
+def beam_rows(found: Identified) -> Iterator[list[Cell]]:
+    """Compare the suspended beam with a free beam."""
     strong = [mode for mode in found.modes if mode.level > STRONG]
     for mode in found.modes:
         number = strong.index(mode) if mode in strong else -1
-        row = against_theory(mode, strong[0], number, 1.0) if number >= 0 else ["", "no mode of a beam"]
-        made.add_row(*told(mode), *row)
-    return made
+        row = against_theory(mode, strong[0], number, 1.0) if number >= 0 else [None] * 4
+        yield [*told(mode), *row]
 
 
-def ruler_table(title: str, found: Identified) -> Table:
-    """Of the ruler: the number of the free beam's shape that each mode is most like."""
-    made = table(title, "Hz|damping %|dB|shape of|as alike as|over the first|free beam|off by %|lines tell %")
+def ruler_rows(found: Identified) -> Iterator[list[Cell]]:
+    """Compare the ruler with the free beam's shape that each mode is most like."""
     roots = beam_roots("free-free", 7)
     for mode in found.modes:
         shape = mode.lines[:, int(np.argmin(np.abs(found.frequencies - mode.frequency)))]
         likeness = [alike(shape, free_shape(root, PLACES)) for root in roots]
         number = int(np.argmax(likeness))
-        row = against_theory(mode, found.modes[0], number, RULER_STEP) if likeness[number] > 0.8 else []
-        made.add_row(*told(mode), f"{number + 1}", f"{likeness[number]:.2f}", *row)
-    return made
+        like = likeness[number] > 0.8
+        row = against_theory(mode, found.modes[0], number, RULER_STEP) if like else [None] * 4
+        yield [*told(mode), f"{number + 1}", f"{likeness[number]:.2f}", *row]
 
 
-def struck_table(title: str, decay: Identified, response: Identified) -> Table:
-    """Modes from the free decay, beside those from the transfer function."""
-    made = table(title, "Hz|damping %|dB|from the transfer function, Hz|damping %|dB")
+def struck_rows(decay: Identified, response: Identified) -> Iterator[list[Cell]]:
+    """Compare modes from the free decay with those from the transfer function."""
     for mode in decay.modes:
         near = min(response.modes, key=lambda other: abs(other.frequency - mode.frequency))
         close = abs(near.frequency - mode.frequency) < 1.0
-        made.add_row(*told(mode), *(told(near) if close else ["not found"]))
-    return made
+        yield [*told(mode), *(told(near) if close else ["not found", None, None])]
 
 
-def blow_table(title: str, forces: FloatArray) -> Table:
-    """Each blow, and below it a spline's and a trapezoid's."""
-    made = table(title, "blow|peak N|impulse mN s|above 10 % us|above 50 % us|touches")
+def blow_rows(forces: FloatArray) -> Iterator[list[Cell]]:
+    """Measure each blow, and below it by a spline and a trapezoid."""
     for number, force in enumerate(forces, start=1):
         blow = measure_blow(force, HAMMER_RATE)
-        made.add_row(
+        yield [
             f"{number}",
             f"{blow.peak:.2f} ± {blow.peak_sigma:.2f}",
             f"{1e3 * blow.impulse:.3f} ± {1e3 * blow.impulse_sigma:.3f}",
             f"{1e6 * blow.duration:.2f} ± {1e6 * blow.duration_sigma:.2f}",
             f"{1e6 * blow.width:.2f}",
             f"{blow.touches}",
-        )
+        ]
         samples = force[:60] - np.median(force[2000:])
         spline = CubicSpline(np.arange(60.0) / HAMMER_RATE, samples)
         peak = float(spline(spline.derivative().roots(extrapolate=False)).max())
         tenth, half = (np.ptp(spline.solve(share * peak, extrapolate=False)) for share in (0.1, 0.5))
         impulse = np.trapezoid(samples, dx=1.0 / HAMMER_RATE)
         off = 5.0 / 384.0 * np.abs(np.diff(samples, 4)).max()
-        made.add_row(
-            "otherwise",
+        yield [
+            f"{number}, spline and trapezoid",
             f"{peak:.2f} ± {off:.2f}",
             f"{1e3 * impulse:.3f}",
             f"{1e6 * tenth:.2f}",
             f"{1e6 * half:.2f}",
-            "",
-        )
-    return made
+            None,
+        ]
 
 
 def drawn(axes: Axes, title: str, frequencies: FloatArray, values: ComplexArray, found: Identified) -> None:
@@ -190,7 +175,7 @@ def picture(data: Path, found: dict[str, Identified], out: Path) -> None:
 
 def main() -> None:
     """Measure, print, and draw where asked."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("--out", type=Path, help="a picture, PNG")
     wanted = parser.parse_args()
     data = find_shared_data()
@@ -198,19 +183,23 @@ def main() -> None:
         raise SystemExit(WHY_NOT)
     forces, responses = hammer_blows(data)
     measured = frequency_response(forces, responses, HAMMER_RATE)
-    beam, beam_title = timed("suspended beam", lambda: modes_of_response(*suspended_beam(data), BEAM))
-    bar, bar_title = timed("ruler", lambda: modes_of_response(*ruler(data), RULER))
-    decay, struck_title = timed(
-        "struck structure, free decay", lambda: modes_of_decay(responses[:, BEGUN:], HAMMER_RATE, STRUCK)
-    )
+    beam, beam_s = timed(lambda: modes_of_response(*suspended_beam(data), BEAM))
+    bar, bar_s = timed(lambda: modes_of_response(*ruler(data), RULER))
+    decay, struck_s = timed(lambda: modes_of_decay(responses[:, BEGUN:], HAMMER_RATE, STRUCK))
     response = modes_of_response(measured.frequencies, measured.h1, STRUCK)
     console = Console(width=130)
-    console.print(beam_table(beam_title, beam))
-    console.print(ruler_table(bar_title, bar))
+    mode = "frequency [Hz]; damping [%]; level [dB]"
+    theory = "ratio to the first; ratio of a free beam; difference [%] +.2f; line resolution [%]"
+    finish_figure("strikes", "beam", f"{mode}; {theory}", beam_rows(beam))
+    like = "beam mode; modal assurance criterion"
+    finish_figure("strikes", "ruler", f"{mode}; {like}; {theory}", ruler_rows(bar))
     for note in (*beam.notes, *bar.notes, *decay.notes):
         console.print(note)
-    console.print(struck_table(struck_title, decay, response))
-    console.print(blow_table("blows; a spline's error bound is 5/384 of the fourth difference", forces))
+    finish_figure("strikes", "struck structure", f"{mode}; response: {mode}", struck_rows(decay, response))
+    blow = "blow; peak [N]; impulse [mN s]; above 10 % [us]; above 50 % [us]; contacts"
+    finish_figure("strikes", "three blows", blow, blow_rows(forces))
+    seconds = (("beam", beam_s), ("ruler", bar_s), ("struck structure, free decay", struck_s))
+    finish_figure("strikes", "time of an analysis", "recording; time [CPU s] .2f", seconds)
     assert measured.coherence is not None
     low, high = measured.band
     console.print(

@@ -7,9 +7,7 @@ The gap is ``target``: an arm that repeats to 0.03 mm, a sensor whose pitch is o
 too, which takes minutes of the processor.
 """
 
-import argparse
 import json
-import sys
 import tempfile
 from pathlib import Path
 from time import process_time
@@ -18,19 +16,22 @@ import numpy as np
 
 from calibration.taxim.arm.record import ArmPresses, read_arm_run
 from harness.recording.recording import Recording
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 from tests.support.arm_presses import gap_of_aspect, performed
 
 
 def main() -> None:
-    """A line a seed, and what all of them say of the stated errors."""
-    options = argparse.ArgumentParser(description=__doc__)
+    """Print or write a row a seed, and the errors relative to the stated ones."""
+    options = benchmark_parser(__doc__)
     options.add_argument("seeds", type=int, nargs="+")
     options.add_argument("--presses", type=int, default=49)
     options.add_argument("--gap", default="target")
     options.add_argument("--aspect", type=float, help="pixels drawn so many times as high as wide")
     options.add_argument("--colours", action="store_true")
     asked = options.parse_args()
-    over = []
+    over: list[list[float]] = []
+    rows: list[list[Cell]] = []
     for seed in asked.seeds:
         with tempfile.TemporaryDirectory() as folder:
             began = process_time()
@@ -40,17 +41,21 @@ def main() -> None:
             recording = performed(Path(folder) / "run", asked.presses, seed, gap)
             pressed = process_time() - began
             run = read_arm_run(recording.folder)
-            over.append(line(seed, run, recording, pressed))
-            if asked.colours:
-                colours(run)
+            relative, row = measure(seed, run, recording, pressed)
+            over.append(relative)
+            rows.append([*row, colours(run) if asked.colours else None])
     rms = np.sqrt(np.mean(np.square(over), axis=0))
-    names = ("pitch", "aspect", "rotation", "skew")
-    told = ", ".join(f"{name} {value:.2f}" for name, value in zip(names, rms, strict=True))
-    sys.stdout.write(f"errors over stated sigmas, rms of {len(over)} seeds (mock): {told}\n")
+    texts = [f"{value:.2f}" for value in rms]
+    rows.append(["rms of the errors over stated sigmas", *texts, None, None, None])
+    heads = "seed; pitch error (sigma) [%]; aspect error (sigma) [%]; rotation error (sigma) [deg]"
+    more = "skew (sigma) [deg]; residual [mm] .3f; time [CPU s] .1f; colours held out [dB]"
+    finish_figure("touch_calibration", "arm", f"{heads}; {more}", rows)
 
 
-def line(seed: int, run: ArmPresses, recording: Recording, pressed: float) -> list[float]:
-    """Print one seed; the errors over their sigmas."""
+def measure(
+    seed: int, run: ArmPresses, recording: Recording, pressed: float
+) -> tuple[list[float], list[Cell]]:
+    """Measure one seed: the errors over their sigmas, and its row."""
     true = json.loads(recording.truth_path.read_text())["differences"]
     began = process_time()
     found = run.scale()
@@ -64,31 +69,26 @@ def line(seed: int, run: ArmPresses, recording: Recording, pressed: float) -> li
     )
     off = [one.value - right for one, right in pairs]
     sigma = [one.sigma for one, _ in pairs]
-    sys.stdout.write(
-        f"seed {seed}, {len(run.taken)} presses (mock): pitch {100 * off[0] / pitch:+.2f} % "
-        f"(sigma {100 * sigma[0] / pitch:.2f}), aspect {100 * off[1]:+.2f} % ({100 * sigma[1]:.2f}), "
-        f"rotation {np.degrees(off[2]):+.3f} deg ({np.degrees(sigma[2]):.3f}), skew "
-        f"{np.degrees(off[3]):+.3f} deg ({np.degrees(sigma[3]):.3f}), scatter {1e3 * found.scatter:.3f} mm; "
-        f"processor {pressed:.1f} s pressed, {seconds:.1f} s measured\n"
-    )
-    sys.stdout.flush()
-    return [one / by for one, by in zip(off, sigma, strict=True)]
+    row: list[Cell] = [
+        f"{seed}, {len(run.taken)} presses",
+        f"{100 * off[0] / pitch:+.2f} ({100 * sigma[0] / pitch:.2f})",
+        f"{100 * off[1]:+.2f} ({100 * sigma[1]:.2f})",
+        *(f"{np.degrees(off[k]):+.3f} ({np.degrees(sigma[k]):.3f})" for k in (2, 3)),
+        1e3 * found.scatter,
+        pressed + seconds,
+    ]
+    return [one / by for one, by in zip(off, sigma, strict=True)], row
 
 
-def colours(run: ArmPresses) -> None:
-    """Print how well presses are predicted that the colours were not fitted to."""
+def colours(run: ArmPresses) -> str:
+    """Score presses that the colours were not fitted to: centre refitted; as detected; untouched gel."""
     from calibration.taxim.mark_free import Identity, calibrate
     from calibration.taxim.pictures import squared
 
     scale = run.scale()
     who = Identity(run.sensor, run.serial, "mock", "2026-01-01", scale.pitch.value, run.ball_radius)
     made = calibrate(squared(run.pictures, scale.aspect_taken), who)
-    sys.stdout.write(
-        f"  colours: {made.median('table'):.2f} dB held out, centre refitted; {made.median('unrefitted'):.2f}"
-        f" as detected; {made.median('nothing'):.2f} untouched; {len(made.used)} presses, "
-        f"{made.seconds:.0f} s\n"
-    )
-    sys.stdout.flush()
+    return "; ".join(f"{made.median(of):.2f}" for of in ("table", "unrefitted", "nothing"))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ to a file of JSON lines, and a run that lies in it is not performed again; ``--s
 is.
 """
 
-import argparse
 import json
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -21,7 +20,6 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
@@ -45,6 +43,8 @@ from harness.effects.scene_object import known_object
 from harness.effects.sound_effects import EDGE, MODES
 from harness.experiment.subjects import objects
 from harness.recording.run_folder import station_calibration
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 from tests.support.real_data import find_shared_data
 
 COUNTS = (1, 2, 6)
@@ -200,24 +200,24 @@ def _append(path: Path | None, new: Iterable[CheckedAnswer]) -> None:
             stream.writelines(f"{json.dumps(asdict(row))}\n" for row in new)
 
 
-def table_of(rows: Sequence[CheckedAnswer]) -> Table:
-    """By sense, level and contacts: refused of answered, mean error of the rest, in their region, lost.
+def finish_levels(rows: Sequence[CheckedAnswer]) -> None:
+    """Print or write by sense, level and contacts: refused, mean error of the rest, in their region, lost.
 
     Lost are answers that hold the truth at the default levels, and here are refused or do not.
     """
-    columns = (f"{count}: refused / of, mean mm, in region, lost" for count in COUNTS)
-    table = Table("sense", "level", *columns)
+    cells_of = []
     right = {_run_of(row) for row in rows if row.level == DEFAULT and row.inside}
     for sense, level in dict.fromkeys((row.sense, row.level) for row in rows):
         of = [row for row in rows if (row.sense, row.level) == (sense, level)]
         parts = ([row for row in of if row.contacts == count] for count in COUNTS)
-        table.add_row(sense, level, *(_counted(part, right) for part in parts))
-    return table
+        cells_of.append([f"{sense}, {level}", *(cell for part in parts for cell in _counted(part, right))])
+    heads = (f"{count} contacts: refused; mean error [mm] .1f; in the region; lost" for count in COUNTS)
+    finish_figure("localization", "refused", "; ".join(("sense and levels", *heads)), cells_of)
 
 
-def refusals_of(rows: Sequence[CheckedAnswer]) -> Table:
-    """By object and contacts: refused answers of all levels and senses, and the runs that these are of."""
-    table = Table("object", *(f"{count}: refused / of, runs" for count in COUNTS))
+def finish_refusals(rows: Sequence[CheckedAnswer]) -> None:
+    """Print by object and contacts: refused answers of all levels and senses, and the runs they are from."""
+    table = []
     for name in (*dict.fromkeys(row.object for row in rows), "all"):
         cells_of = []
         for count in COUNTS:
@@ -225,15 +225,16 @@ def refusals_of(rows: Sequence[CheckedAnswer]) -> Table:
             refused = [row for row in of if row.refusal]
             runs = {(row.object, row.seed, row.spacing) for row in refused}
             cells_of.append(f"{len(refused)} / {len(of)}, {len(runs)}")
-        table.add_row(name, *cells_of)
-    return table
+        table.append([name, *cells_of])
+    heads = (f"{count} contacts: refused / of, runs" for count in COUNTS)
+    finish_figure("localization", "refused by object", "; ".join(("object", *heads)), table)
 
 
-def _counted(rows: Sequence[CheckedAnswer], right: Collection[tuple[object, ...]]) -> str:
+def _counted(rows: Sequence[CheckedAnswer], right: Collection[tuple[object, ...]]) -> list[Cell]:
     errors = [row.error for row in rows if row.error is not None]
     lost = sum(_run_of(row) in right and not row.inside for row in rows)
-    mean = f"{1e3 * sum(errors) / len(errors):.1f}" if errors else "-"
-    return f"{len(rows) - len(errors)} / {len(rows)}, {mean}, {sum(row.inside for row in rows)}, {lost}"
+    mean = 1e3 * sum(errors) / len(errors) if errors else None
+    return [f"{len(rows) - len(errors)} / {len(rows)}", mean, sum(row.inside for row in rows), lost]
 
 
 def _run_of(row: CheckedAnswer) -> tuple[object, ...]:
@@ -242,7 +243,7 @@ def _run_of(row: CheckedAnswer) -> tuple[object, ...]:
 
 def main() -> None:
     """Perform, answer, and print two tables."""
-    options = argparse.ArgumentParser(description=__doc__)
+    options = benchmark_parser(__doc__)
     options.add_argument("objects", nargs="*")
     options.add_argument("--seeds", type=int, default=20)
     options.add_argument("--first-seed", type=int, default=31000)
@@ -257,9 +258,8 @@ def main() -> None:
     choice = Choice(given.spacing, given.sense or ("touch", "both"), given.level, given.another)
     seeds = range(given.first_seed, given.first_seed + given.seeds)
     rows = checked_runs(scenes, seeds, choice, given.rows)
-    console = Console(width=140)
-    console.print(table_of(rows))
-    console.print(refusals_of(rows))
+    finish_levels(rows)
+    finish_refusals(rows)
 
 
 if __name__ == "__main__":

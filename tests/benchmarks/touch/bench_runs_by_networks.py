@@ -9,7 +9,6 @@ answer is appended to a file of JSON lines, and a run that lies in it is not per
 stopped goes on, and ``--seeds 0`` prints what there is.
 """
 
-import argparse
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -17,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, perform
 from experiments.contact_localization.accuracy.dials import needs_images
@@ -28,6 +26,8 @@ from harness.bench.station_file import load_station, station_path
 from harness.effects.accuracy import Level, Setting
 from harness.effects.sound_effects import SHAPES as SOUND
 from harness.effects.touch_file_effects import SHAPES as TOUCH
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 
 LEVELS: Mapping[str, Setting] = {
     "simulation": {TOUCH.name: "reference", SOUND.name: "elements"},
@@ -97,19 +97,20 @@ def _append(path: Path | None, new: Iterable[AnsweredRun]) -> None:
             stream.writelines(f"{json.dumps(asdict(row))}\n" for row in new)
 
 
-def table_of(rows: list[AnsweredRun]) -> Table:
-    """Of every object and of all: errors, regions that hold, and the mean of seconds, by both levels."""
-    table = Table("object", "sense", "runs", "median, mm", "mean, mm", "of means", "in region", "CPU s")
+def finish_objects(rows: list[AnsweredRun]) -> None:
+    """Print or write, for every object and for all: errors, regions that hold and mean seconds."""
+    table = []
     objects = list(dict.fromkeys(row.object for row in rows))
     for name in (*objects, "all"):
         for sense in SENSES.levels:
             of = [row for row in rows if name in (row.object, "all") and row.sense == sense]
             if of:
-                table.add_row(name, str(sense), *_cells(of))
-    return table
+                table.append([f"{name}, {sense}", *_cells(of)])
+    heads = "object and sense: simulation / networks; runs; median [mm]; mean [mm]; ratio of means .2f"
+    finish_figure("objectfile", "localization", f"{heads}; in the region; time [CPU s]", table)
 
 
-def _cells(rows: list[AnsweredRun]) -> list[str]:
+def _cells(rows: list[AnsweredRun]) -> list[Cell]:
     """Of one sense: simulation / networks."""
     parts = [[row for row in rows if row.levels == levels] for levels in LEVELS]
     errors = [1e3 * np.array([row.error for row in part]) for part in parts]
@@ -126,14 +127,14 @@ def _cells(rows: list[AnsweredRun]) -> list[str]:
 
 def main() -> None:
     """Perform, answer, and print a table."""
-    options = argparse.ArgumentParser(description=__doc__)
+    options = benchmark_parser(__doc__)
     options.add_argument("objects", nargs="+")
     options.add_argument("--seeds", type=int, default=12)
     options.add_argument("--first-seed", type=int, default=0)
     options.add_argument("--rows", type=Path)
     given = options.parse_args()
     seeds = range(given.first_seed, given.first_seed + given.seeds)
-    Console(width=140).print(table_of(answered_objects(given.objects, seeds, given.rows)))
+    finish_objects(answered_objects(given.objects, seeds, given.rows))
 
 
 if __name__ == "__main__":

@@ -21,6 +21,8 @@ from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
 from harness.sim.optics.inverse import invert
 from harness.sim.optics.optics import Optics, OpticsLevel
 from harness.sim.optics.tactile_calibration import TactileCalibration, shipped_calibration
+from tests.benchmarks.results import finish_figure, spread
+from tests.docs.results import Cell, Spread
 from tests.oracles.mujoco_depth import CannotDraw, gaps_drawn
 
 pytestmark = pytest.mark.benchmark
@@ -40,9 +42,8 @@ def _timed(work: Callable[[int], object], repeats: int) -> FloatArray:
     return seconds
 
 
-def _line(what: str, seconds: FloatArray) -> None:
-    low, middle, high = np.percentile(seconds * 1e3, [10, 50, 90])
-    print(f"  {what:<44} {middle:9.3f} ms  ({low:.3f} to {high:.3f})  {1e3 / middle:8.0f} /s")  # noqa: T201
+def _time(work: Callable[[int], object], repeats: int) -> Spread:
+    return spread(_timed(work, repeats) * 1e3, 0.1, 0.9)
 
 
 def _poses(name: str, rng: np.random.Generator) -> tuple[RasterMesh, FloatArray]:
@@ -107,59 +108,62 @@ def test_touch(capsys: pytest.CaptureFixture[str]) -> None:
     scenes = [_poses(name, rng) for name in ("mug", "bowl", "plate", "pitcher", "tray", "wrench")]
     contacts = [(raster, pose[None]) for raster, poses in scenes for pose in poses]
     with capsys.disabled():
-        for rows in (120, 240, 480):
-            _size(_sensor(rows), contacts, world)
+        sensors = [_sensor(rows) for rows in (120, 240, 480)]
+        sizes = [_size(sensor, contacts, world) for sensor in sensors]
+        heads = (f"{sensor.columns} x {sensor.rows} [CPU ms] .3g" for sensor in sensors)
+        table = [(stage, *(size.get(stage) for size in sizes)) for stage in sizes[0]]
+        stage = f"stage, {len(contacts)} presses of {DEPTH * 1e3:g} mm: median (10th to 90th percentile)"
+        finish_figure("touch", "speed", "; ".join((stage, *heads)), table)
         _inverse(contacts, world, bench)
 
 
 def _size(
     sensor: TactileSensor, contacts: list[tuple[RasterMesh, FloatArray]], world: TactileCalibration
-) -> None:
+) -> dict[str, Cell]:
     skirt = R15_SKIRT if sensor.rows == 120 else TAXIM_SKIRT
     gaps = np.concatenate([height_maps(raster, pose, sensor) for raster, pose in contacts])
     pressed = over_range(penetration(gaps, sensor), sensor)[0]
-    area = np.median((pressed > 0).mean(axis=(1, 2)))
-    print(  # noqa: T201
-        f"\n{sensor.columns} x {sensor.rows}, {len(contacts)} contacts of {DEPTH * 1e3:g} mm on six objects, "
-        f"median contact area {area:.0%} of the window"
-    )
-    _line("height map", _timed(lambda k: height_maps(*contacts[k], sensor), len(contacts)))
-    _beside_mujoco(sensor, contacts, gaps)
     few = 12
-    _line("gel, exact", _timed(lambda k: deform(pressed[k : k + 1], skirt), few))
-    _line("gel, fast", _timed(lambda k: deform(pressed[k : k + 1], skirt, "fast"), few))
-    _line("gel, original (OpenCV)", _timed(lambda k: _original_gel(pressed[k], skirt), few))
+    rows: dict[str, Cell] = {
+        "contact area, median [% of the window]": 100.0 * float(np.median((pressed > 0).mean(axis=(1, 2)))),
+        "height map": _time(lambda k: height_maps(*contacts[k], sensor), len(contacts)),
+        **_beside_mujoco(sensor, contacts, gaps),
+        "gel, exact": _time(lambda k: deform(pressed[k : k + 1], skirt), few),
+        "gel, fast": _time(lambda k: deform(pressed[k : k + 1], skirt, "fast"), few),
+        "gel, original arithmetic (OpenCV)": _time(lambda k: _original_gel(pressed[k], skirt), few),
+    }
     gel = deform(pressed[:few], skirt, "fast")
     calibration = _enlarged(world, sensor)
     for level in LEVELS:
         optics = Optics(calibration, level)
-        _line(f"colour, {level}", _timed(lambda k, optics=optics: optics.render(gel[k : k + 1]), few))  # type: ignore[misc]
+        rows[f"colours, {level}"] = _time(lambda k, optics=optics: optics.render(gel[k : k + 1]), few)  # type: ignore[misc]
     table, background = calibration.table.astype(np.float64), calibration.background.astype(np.float64)
-    _line(
-        "colour, original arithmetic (numpy)",
-        _timed(lambda k: _original_optics(gel[k] / sensor.pitch, table, background), few),
+    rows["colours, original arithmetic (numpy)"] = _time(
+        lambda k: _original_optics(gel[k] / sensor.pitch, table, background), few
     )
+    return rows
 
 
 def _beside_mujoco(
     sensor: TactileSensor, contacts: list[tuple[RasterMesh, FloatArray]], ours: FloatArray
-) -> None:
+) -> dict[str, Cell]:
     scenes = [(raster.mesh, pose) for raster, pose in contacts]
     try:
         drawn, seconds = gaps_drawn(scenes, sensor)
-    except CannotDraw as why:
-        print(f"  MuJoCo draws nothing here: {why}")  # noqa: T201
-        return
+    except CannotDraw:
+        return {}
     theirs = np.concatenate(drawn)
     both = np.isfinite(ours) & np.isfinite(theirs)
     apart = np.abs(ours[both] - theirs[both]) * 1e6
     one_alone = (np.isfinite(ours) != np.isfinite(theirs)).mean()
     middle, most = np.percentile(apart, [50.0, 99.0])
-    print(  # noqa: T201
-        f"  {'MuJoCo renderer':<44} {seconds * 1e3:9.3f} ms; ours is {middle:.4f} um from it in the median,\n"
-        f"    {most:.4f} at p99, {apart.max():.2f} at most; {(apart > 10.0).mean():.1e} of the pixels beyond "
-        f"10 um, {one_alone:.1e} met by one alone"
-    )
+    return {
+        "height map by MuJoCo's renderer": seconds * 1e3,
+        "difference of the height maps, median [um]": float(middle),
+        "the same, 99th percentile [um]": float(most),
+        "pixels more than 10 um apart [%]": 100.0 * float((apart > 10.0).mean()),
+        "pixels hit by one method alone [%]": 100.0 * float(one_alone),
+    }
 
 
 def _inverse(
@@ -168,16 +172,16 @@ def _inverse(
     gaps = np.concatenate([height_maps(raster, pose, GELSIGHT_R15) for raster, pose in contacts])
     gel = deform(over_range(penetration(gaps, GELSIGHT_R15), GELSIGHT_R15)[0], R15_SKIRT)
     images = Optics(world, "exact").render(gel).images
-    print("\n160 x 120, image to height map, drawn under the world's calibration")  # noqa: T201
-    _line("inverse, the bench's calibration", _timed(lambda k: invert(images[k : k + 1], bench), len(images)))
+    seconds = _time(lambda k: invert(images[k : k + 1], bench), len(images))
+    table: list[tuple[Cell, ...]] = [("time of an inversion [CPU ms]", seconds, None)]
     for name, calibration in (("the world's own", world), ("the bench's", bench)):
         read = invert(images, calibration)
         error = (read.height - gel)[read.anchored]
         rms = np.sqrt(np.mean(error**2, axis=(1, 2))) * 1e6
         level = error - error.mean(axis=(1, 2), keepdims=True)
         shape = np.sqrt(np.mean(level**2, axis=(1, 2))) * 1e6
-        print(  # noqa: T201
-            f"  {name} calibration: rms {np.median(rms):.0f} um (90 %: {np.percentile(rms, 90):.0f}), "
-            f"level aside {np.median(shape):.0f} um (90 %: {np.percentile(shape, 90):.0f}), "
-            f"{read.anchored.mean():.0%} with some gel at rest in view"
-        )
+        for words, off in (("rms error [um]", rms), ("rms error without the mean [um]", shape)):
+            table.append(
+                (f"{name} calibration, {words}", float(np.median(off)), float(np.percentile(off, 90)))
+            )
+    finish_figure("touch", "image to height map", "quantity; median; 90th percentile", table)

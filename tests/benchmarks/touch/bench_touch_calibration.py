@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from calibration.taxim.gates import check_set, refusals, sightings
 from calibration.taxim.held_out import WITHIN, decibels
@@ -24,11 +23,21 @@ from calibration.taxim.table import table_shades
 from harness.basics.arrays import AnyArray, ByteArray, FloatArray, IntArray
 from harness.basics.errors import CalibrationRefused
 from harness.sim.optics.published_pack import read_table
+from tests.benchmarks.results import benchmark_parser, finish_figure, spread
+from tests.docs.results import Cell
 from tests.support.real_data import WHY_NOT, find_shared_data
 
 CONSOLE = Console(width=118, highlight=False)
 R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)
 FOTS = Identity("GelSight", "FOTS", "MIT", "2026-01-01", 1e-3 / 19.58, 2.35e-3)
+
+SCORES = {
+    "table": "table",
+    "smooth": "smooth",
+    "unrefitted": "table, centre as detected",
+    "nothing": "untouched gel",
+}
+"""Scores of presses held out in eight folds; the centre is refitted unless stated."""
 
 SEARCHED = np.arange(-3.0, 3.01, 0.5)
 """Pixels about the fitted centre in which the published table may choose its own."""
@@ -42,47 +51,36 @@ def main() -> None:
         raise SystemExit(WHY_NOT)
     wanted = ["r15", "fots", "damage"] if "all" in options.what else options.what
     r15 = read_pictures(data / "tactile/objectfolder_calibs")
+    rows: list[list[Cell]] = []
     if "r15" in wanted:
-        made = _measured("R1.5, 49 presses of 160 x 120", r15, R15, options.repeats)
+        made, row = _measured("R1.5, 160 x 120", r15, R15, options.repeats)
+        rows.append(row)
         _published(made, r15, data / "tactile/objectfolder_calibs/polycalib.npz")
     if "fots" in wanted:
         folder = data / "tactile/fots_ball_presses"
         fots = read_pictures(folder / "gelsight", folder / "gelsight_bg.png")
-        _measured("FOTS GelSight, 42 presses of 240 x 320", fots, FOTS, options.repeats)
+        rows.append(_measured("FOTS GelSight, 240 x 320", fots, FOTS, options.repeats)[1])
+    if rows:
+        scores = "; ".join(f"{words}: median (10th to 90th percentile) [dB] .2f" for words in SCORES.values())
+        finish_figure("touch_calibration", "colours", f"set; used; refused; {scores}; time [CPU s] .1f", rows)
     if "damage" in wanted:
         _damage(r15)
 
 
-def _measured(title: str, pictures: Pictures, who: Identity, repeats: int) -> MarkFree:
-    walls, processors = [], []
+def _measured(title: str, pictures: Pictures, who: Identity, repeats: int) -> tuple[MarkFree, list[Cell]]:
+    processors = []
     for _ in range(repeats):
-        began, worked = time.perf_counter(), time.process_time()
+        worked = time.process_time()
         made = calibrate(pictures, who)
-        walls.append(time.perf_counter() - began)
         processors.append(time.process_time() - worked)
-    table = Table(title=f"{title}: {len(made.used)} used, {len(made.refused)} refused", title_justify="left")
-    for heading in ("held out, eight folds by press", "median dB", "p10", "p90"):
-        table.add_column(heading, justify="left" if heading.startswith("held") else "right")
-    for which, words in (
-        ("table", "table, only the centre refitted"),
-        ("smooth", "smooth model, only the centre refitted"),
-        ("unrefitted", "table, centre as detected"),
-        ("nothing", "untouched gel"),
-    ):
-        every = [vars(press.score)[which] for press in made.used]
-        table.add_row(words, *(f"{np.percentile(every, at):.2f}" for at in (50, 10, 90)))
-    CONSOLE.print(table)
+    scores = [spread([vars(press.score)[which] for press in made.used], 0.1, 0.9) for which in SCORES]
+    row: list[Cell] = [title, len(made.used), len(made.refused), *scores, spread(processors)]
     CONSOLE.print(
         f"contact line {made.contact_radius:.1f} px of a ball of {who.ball:.1f} px, round to "
         f"{made.roundness:.2f} px; scored within {WITHIN * made.contact_radius:.1f} px; the smooth model "
         f"leans by {np.degrees(made.lean):.1f} deg"
     )
-    CONSOLE.print(f"seconds: {_spread(walls)} on the clock, {_spread(processors)} of the processor\n")
-    return made
-
-
-def _spread(seconds: list[float]) -> str:
-    return f"{np.median(seconds):.1f} ({min(seconds):.1f} to {max(seconds):.1f}, {len(seconds)} runs)"
+    return made, row
 
 
 def _published(made: MarkFree, pictures: Pictures, path: Path) -> None:
@@ -124,15 +122,10 @@ def _damage(pictures: Pictures) -> None:
         "nothing pressed": lambda: _with(pictures, np.repeat(pictures.background[None], len(images), axis=0)),
         "every press twice": lambda: _with(pictures, np.concatenate([pictures.images] * 2)),
     }
-    table = Table(title="the R1.5 set, damaged", show_lines=True, title_justify="left")
-    for heading in ("damage", "answer"):
-        table.add_column(heading)
-    for words, spoil in ways.items():
-        table.add_row(words, _said(spoil(), R15))
-    table.add_row(
-        "a ball of 1 mm given for one of 2 mm", _said(pictures, replace(R15, ball_radius=1e-3), fit=True)
-    )
-    CONSOLE.print(table)
+    rows = [(words, _said(spoil(), R15)) for words, spoil in ways.items()]
+    smaller = _said(pictures, replace(R15, ball_radius=1e-3), fit=True)
+    rows.append(("a ball of 1 mm given for one of 2 mm", smaller))
+    finish_figure("touch_calibration", "damaged set", "damage of the R1.5 set; answer", rows)
 
 
 def _said(pictures: Pictures, who: Identity, fit: bool = False) -> str:
@@ -163,7 +156,7 @@ def _byte(values: AnyArray) -> ByteArray:
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("what", nargs="*", default="all", choices=["all", "r15", "fots", "damage"])
     parser.add_argument("--repeats", type=int, default=1)
     return parser.parse_args()

@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 from threadpoolctl import threadpool_limits
 
 from harness.authoring.touch.data import DEPTHS, MOST_TILT, draw_presses, reference_maps
@@ -45,6 +44,8 @@ from harness.picture.image_metrics import mean_square, psnr, ssim
 from harness.sim.gel.height_map import RasterMesh
 from harness.sim.gel.presses import Presses
 from harness.sim.optics.tactile_calibration import shipped_calibration
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 
 CALIBRATION = shipped_calibration("gelsight_r15_bench")
 SKIRT = CALIBRATION.header.skirt
@@ -52,20 +53,25 @@ SEED = 11
 
 
 def main() -> None:
-    """One table for each object."""
-    parser = argparse.ArgumentParser()
+    """Print or write one table of all objects."""
+    parser = benchmark_parser(__doc__)
     parser.add_argument("objects", nargs="*", metavar="OBJECT", help=f"built in: {', '.join(MATERIALS)}")
     parser.add_argument("--objectfile", type=Path)
     parser.add_argument("--profile", default="standard")
     parser.add_argument("--presses", type=int, default=200)
     parser.add_argument("--repeat", type=int, default=9)
     asked = parser.parse_args()
+    rows: list[list[Cell]] = []
     with tempfile.TemporaryDirectory() as folder, threadpool_limits(limits=1):
         for name in asked.objects or ["mug"]:
             if asked.objectfile is None:
-                measure(_made(name, asked.profile, Path(folder) / name), asked)
+                rows += measure(_made(name, asked.profile, Path(folder) / name), asked)
         if asked.objectfile is not None:
-            measure(ObjectFile.open(asked.objectfile), asked)
+            rows += measure(ObjectFile.open(asked.objectfile), asked)
+    maps = "map error, rms, median [um]; 90th percentile [um]; map, median [dB]; 10th percentile [dB]"
+    pictures = "picture error [grey levels]; picture, median [dB]; 10th percentile [dB]; SSIM"
+    times = f"one map [CPU ms]; one of {CHUNK} [CPU ms]"
+    finish_figure("touchnet", "objects", f"object, maps from; {maps}; {pictures}; {times}", rows)
 
 
 def _made(name: str, profile: str, folder: Path) -> ObjectFile:
@@ -77,34 +83,21 @@ def _made(name: str, profile: str, folder: Path) -> ObjectFile:
     return with_touch(create_object(folder, name, mesh, made_of, origin), part)
 
 
-def measure(of: ObjectFile, asked: argparse.Namespace) -> None:
-    """One object."""
+def measure(of: ObjectFile, asked: argparse.Namespace) -> list[list[Cell]]:
+    """Measure one object."""
     coded, reference = open_touch(of, "codes"), open_touch(of, "reference")
     codes = coded.maps
     assert isinstance(codes, CodeMaps)
     presses = _possible(of, codes, asked.presses)
     truth = reference.at(presses)
-    table = Table(title=f"{of.description.name}: {len(presses)} presses at places that were never coded")
-    for head in (
-        "maps from",
-        "rms um, median",
-        "90th",
-        "map dB",
-        "10th",
-        "picture grey",
-        "dB",
-        "10th",
-        "SSIM",
-        "ms a map, alone",
-        f"by {CHUNK}",
-    ):
-        table.add_column(head)
+    name, rows = f"{of.description.name}, {len(presses)} presses", list[list[Cell]]()
     for said, touch in (("rasteriser (reference)", reference), ("codes", coded)):
-        table.add_row(said, *_errors(touch.at(presses), truth), *_costs(touch.at, presses, asked.repeat))
-    table.add_row("nearest coded place", *_errors(_nearest(of, codes, reference, presses), truth), "", "")
-    table.add_row("untouched gel", *_errors(np.zeros_like(truth), truth), "", "")
+        errors = _errors(touch.at(presses), truth)
+        rows.append([f"{name}: {said}", *errors, *_costs(touch.at, presses, asked.repeat)])
+    nearest = _errors(_nearest(of, codes, reference, presses), truth)
+    rows.append([f"{name}: nearest coded place", *nearest, None, None])
+    rows.append([f"{name}: untouched gel", *_errors(np.zeros_like(truth), truth), None, None])
     console = Console(width=150)
-    console.print(table)
     pairs = (
         ("codes, two graphs", _twice(of)),
         ("rasteriser", _halves(reference.maps, reference.maps)),
@@ -113,6 +106,7 @@ def measure(of: ObjectFile, asked: argparse.Namespace) -> None:
         console.print(
             f"  {said}, batches of {CHUNK} on two threads: {_throughput(maps, presses, asked.repeat)}"
         )
+    return rows
 
 
 def _possible(of: ObjectFile, codes: CodeMaps, count: int) -> Presses:

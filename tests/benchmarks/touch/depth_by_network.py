@@ -7,13 +7,12 @@ normals within the contact, and around it those of the gel that the same fold's 
 ball.
 """
 
-import argparse
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from rich.console import Console
 
 from calibration.taxim.mark_free import Identity
 from calibration.taxim.pictures import Pictures, PressPack, read_pictures
@@ -24,10 +23,11 @@ from harness.sim.optics.contact_depth import drift_of, read_depth
 from harness.sim.optics.inverse import DRIFTING
 from harness.sim.optics.poisson import anchored_heights, free_heights
 from harness.sim.optics.shading import scaled_position
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 from tests.samples.ball_depth import FOTS, R15, WITHIN, Taught, fit_ball, taught, usable
 from tests.support.real_data import WHY_NOT, find_shared_data
 
-CONSOLE = Console(width=118, highlight=False)
 _WIDTHS = (5, 64, 64, 2)
 _LEVELS = 64.0
 """Grey levels that are one to the network."""
@@ -92,7 +92,7 @@ class Perceptron:
 
 def main() -> None:
     """Both, or the sets that are named."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("what", nargs="*", default="all", choices=["all", "fots", "r15"])
     parser.add_argument("--every", type=int, default=1, help="of the held-out presses, one in so many")
     options = parser.parse_args()
@@ -101,14 +101,20 @@ def main() -> None:
         raise SystemExit(WHY_NOT)
     wanted = ["fots", "r15"] if "all" in options.what else options.what
     folder = data / "tactile/fots_ball_presses"
+    rows: list[list[Cell]] = []
     if "fots" in wanted:
-        beside("FOTS", read_pictures(folder / "gelsight", folder / "gelsight_bg.png"), FOTS, options.every)
+        rows += compare(
+            "FOTS", read_pictures(folder / "gelsight", folder / "gelsight_bg.png"), FOTS, options.every
+        )
     if "r15" in wanted:
-        beside("R1.5", read_pictures(data / "tactile/objectfolder_calibs"), R15, options.every)
+        rows += compare("R1.5", read_pictures(data / "tactile/objectfolder_calibs"), R15, options.every)
+    heads = "method, rms error against the sphere; median [mm] .4f; 90th percentile [mm] .3f; worst [mm] .3f"
+    more = "presses within 0.06 mm; better than the inverse [%] .0f; training of a fold [CPU s] .0f"
+    finish_figure("touch_depth", "network", f"{heads}; {more}", rows)
 
 
-def beside(title: str, pictures: Pictures, who: Identity, every: int) -> None:
-    """Print both errors against the sphere over the presses held out."""
+def compare(title: str, pictures: Pictures, who: Identity, every: int) -> Iterator[list[Cell]]:
+    """Summarize both errors against the sphere over the presses held out."""
     pack = usable(pictures, who.ball)
     change = changes(pack)
     errors, seconds = [], []
@@ -121,17 +127,13 @@ def beside(title: str, pictures: Pictures, who: Identity, every: int) -> None:
         seconds.append(time.process_time() - began)
         errors += [_press(pack, int(k), made, network, who) for k in np.nonzero(out)[0][::every]]
     found = 1e3 * np.array(errors)
-    for words, column in zip(("present inverse", "network"), found.T, strict=True):
+    for words, column in zip(("calibration's inverse", "network"), found.T, strict=True):
         middle, high = np.percentile(column, (50, 90))
         good = int((column <= 0.06).sum())
-        CONSOLE.print(
-            f"{title}, {len(found)} presses, {words}: RMSE {middle:.4f} mm in the median, {high:.4f} at p90, "
-            f"{column.max():.4f} at worst, {good} at most 0.06 mm"
-        )
-    CONSOLE.print(
-        f"the network is better in {(found[:, 1] < found[:, 0]).mean():.0%} of the presses; trained in "
-        f"{max(seconds):.0f} s of the processor a fold"
-    )
+        better = None if words != "network" else 100.0 * float((found[:, 1] < found[:, 0]).mean())
+        trained = None if words != "network" else max(seconds)
+        numbers = float(middle), float(high), float(column.max())
+        yield [f"{title}, {len(found)} presses: {words}", *numbers, good, better, trained]
 
 
 def _trained(pack: PressPack, change: FloatArray, which: IntArray, made: Taught, who: Identity) -> Perceptron:

@@ -10,12 +10,12 @@ for calibrations whose files have no misfit.
 
 import argparse
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from calibration.taxim.mark_free import Identity
 from calibration.taxim.pictures import Pictures, read_pictures
@@ -25,11 +25,14 @@ from harness.sim.optics.contact_depth import read_depth
 from harness.sim.optics.inverse import DRIFTING, invert
 from harness.sim.optics.inverse_error import height_errors
 from harness.sim.optics.poisson import free_heights
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 from tests.oracles.truemap import read_tmd
 from tests.samples.ball_depth import FOTS, R15, WITHIN, BallFit, fit_ball, sigma_without, taught, usable
 from tests.support.real_data import WHY_NOT, find_shared_data
 
 CONSOLE = Console(width=118, highlight=False)
+HEADS = "quantity; median .3f; 10th percentile .3f; 90th percentile .3f; worst .3f"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,25 +57,29 @@ def main() -> None:
     if options.presses is not None:
         pictures = read_pictures(options.presses, options.rest)
         chosen = list(range(options.folds)) if options.only_fold is None else [options.only_fold]
-        _report(str(options.presses), _presses(pictures, FOTS, options.folds, chosen, options.every, known))
+        measured = _presses(pictures, FOTS, options.folds, chosen, options.every, known)
+        finish_figure("touch_depth", "stated-deviations", HEADS, _rows(options.presses.name, measured))
         return
     data = find_shared_data()
     if data is None:
         raise SystemExit(WHY_NOT)
     wanted = ["fots", "r15", "tmd"] if "all" in options.what else options.what
     folds = range(options.folds) if options.only_fold is None else [options.only_fold]
+    rows: list[list[Cell]] = []
     if "fots" in wanted:
         folder = data / "tactile/fots_ball_presses"
         pictures = read_pictures(folder / "gelsight", folder / "gelsight_bg.png")
         measured = _presses(pictures, FOTS, options.folds, list(folds), options.every, known)
-        _report("FOTS GelSight, 240 x 320, ball of 4.70 mm", measured)
+        rows += _rows("FOTS GelSight, ball of 4.70 mm", measured)
         if options.picture is not None:
             _draw(measured, options.picture)
     if "r15" in wanted:
         pictures = read_pictures(data / "tactile/objectfolder_calibs")
-        _report(
-            "GelSight R1.5, 160 x 120, ball of 4 mm",
-            _presses(pictures, R15, options.folds, list(folds), options.every, known),
+        measured = _presses(pictures, R15, options.folds, list(folds), options.every, known)
+        rows += _rows("GelSight R1.5, ball of 4 mm", measured)
+    if rows:
+        finish_figure(
+            "touch_depth", "balls" if options.only_fold is None else "stated-deviations", HEADS, rows
         )
     if "tmd" in wanted:
         _round_trip(data / "tactile/gelsight_groove/heightmap.tmd")
@@ -120,10 +127,8 @@ def _presses(
     return measured
 
 
-def _report(title: str, measured: list[Measured]) -> None:
-    table = Table(title=f"{title}: {len(measured)} presses held out", title_justify="left")
-    for heading in ("within 0.95 of the contact's radius", "median", "p10", "p90", "worst"):
-        table.add_column(heading, justify="left" if heading.startswith("within") else "right")
+def _rows(title: str, measured: list[Measured]) -> Iterator[list[Cell]]:
+    """Summarize the presses of a set: median, 10th and 90th percentile, worst."""
     columns = {
         "RMSE against the sphere, mm": [1e3 * one.ball.rmse for one in measured],
         "the same, a single reading by the smooth model, mm": [1e3 * one.once for one in measured],
@@ -133,20 +138,18 @@ def _report(title: str, measured: list[Measured]) -> None:
         "seconds of the processor, its error": [one.seconds[1] for one in measured],
     }
     for words, values in columns.items():
-        numbers = [*np.percentile(values, (50, 10, 90)), max(values)]
-        table.add_row(words, *(f"{number:.4f}" for number in numbers))
-    covered = [one.covered for one in measured]
-    table.add_row(
-        "share with a trusted slope", *(f"{np.percentile(covered, at):.3f}" for at in (50, 10, 90, 0))
-    )
-    CONSOLE.print(table)
+        numbers = map(float, np.percentile(values, (50, 10, 90, 100)))
+        yield [f"{title}, {len(measured)} presses: {words}", *numbers]
+    covered = map(float, np.percentile([one.covered for one in measured], (50, 10, 90, 0)))
+    yield [f"{title}: fraction of pixels with a trusted slope", *covered]
     scores = np.abs(np.concatenate([one.scores for one in measured]))
     good = sum(one.ball.rmse <= 0.06e-3 for one in measured)
     halved = sum(one.ball.rmse <= 0.5 * one.ball.flat for one in measured)
-    CONSOLE.print(
-        f"at most 0.06 mm: {good} of {len(measured)}; at most half the plane's: {halved}; "
-        f"within 1 / 2 stated deviations: {(scores < 1).mean():.0%} / {(scores < 2).mean():.0%} of pixels\n"
-    )
+    yield [f"{title}: presses within 0.06 mm", good, None, None, None]
+    yield [f"{title}: presses within half of the plane's error", halved, None, None, None]
+    for many in (1, 2):
+        held = 100.0 * float((scores < many).mean())
+        yield [f"{title}: pixels within {many} stated deviations [%]", held, None, None, None]
 
 
 def _round_trip(path: Path) -> None:
@@ -191,7 +194,7 @@ def _draw(measured: list[Measured], path: Path) -> None:
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("what", nargs="*", default="all", choices=["all", "fots", "r15", "tmd"])
     parser.add_argument("--folds", type=int, default=2)
     parser.add_argument("--only-fold", type=int)

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from calibration.taxim.light_fit import pressed_ball
 from calibration.taxim.mark_free import Identity
@@ -23,6 +22,8 @@ from harness.sim.gel.gel import R15_SKIRT, deform
 from harness.sim.optics.optics import Optics, OpticsLevel
 from harness.sim.optics.published_pack import PublishedPack, read_published
 from harness.sim.optics.shadow_image import darkening
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 from tests.samples.real_press import (
     FOTS,
     R15,
@@ -59,13 +60,18 @@ def main() -> None:
     wanted = ["r15", "fots"] if "all" in options.what else options.what
     if "r15" in wanted:
         pack = read_published(data / "tactile/objectfolder_calibs", R15.pitch)
-        _measure("GelSight R1.5, 160 x 120", set_of(data, "r15"), R15, options, pack)
+        _measure("r15", "GelSight R1.5, 160 x 120", set_of(data, "r15"), R15, options, pack)
     if "fots" in wanted:
-        _measure("FOTS GelSight, 240 x 320", set_of(data, "fots"), FOTS, options, None)
+        _measure("fots", "FOTS GelSight, 240 x 320", set_of(data, "fots"), FOTS, options, None)
 
 
 def _measure(
-    title: str, pictures: Pictures, who: Identity, options: argparse.Namespace, pack: PublishedPack | None
+    figure: str,
+    title: str,
+    pictures: Pictures,
+    who: Identity,
+    options: argparse.Namespace,
+    pack: PublishedPack | None,
 ) -> None:
     began = time.process_time()
     rows: dict[str, list[Drawn]] = {}
@@ -78,7 +84,7 @@ def _measure(
         for name, drawn in _drawn(press, pictures.background, pack).items():
             rows.setdefault(name, []).append(drawn)
         floor.append(_untouched_rms(press))
-    _report(f"{title}: {len(presses)} presses held out, {time.process_time() - began:.0f} s", rows)
+    _report(figure, f"{title}, {len(presses)} presses, {time.process_time() - began:.0f} CPU s", rows)
     skirts = sorted({press.calibration.header.skirt.kernels[0] for press in presses})
     cores = sorted({press.calibration.header.skirt.core for press in presses})
     noise = float(np.median([one for one in floor if np.isfinite(one)]))
@@ -131,16 +137,15 @@ def _untouched_rms(press: HeldOut) -> float:
     return float(np.sqrt(np.mean(apart[far] ** 2))) if far.sum() > 500 else np.nan
 
 
-def _report(title: str, rows: dict[str, list[Drawn]]) -> None:
-    table = Table(title=title, title_justify="left")
-    table.add_column("median over the presses (10th percentile), dB")
-    for heading in ("contact", "1.6 radii", "full frame", "SSIM"):
-        table.add_column(heading, justify="right")
+def _report(figure: str, title: str, rows: dict[str, list[Drawn]]) -> None:
+    """Print or write the median over the presses, with the 10th percentile in brackets."""
+    table: list[list[Cell]] = []
     for name, drawn in rows.items():
         columns = [[getattr(one, of) for one in drawn] for of in ("contact", "around", "frame")]
         texts = [f"{np.median(values):.2f} ({np.percentile(values, 10):.2f})" for values in columns]
-        table.add_row(name, *texts, f"{np.median([one.alike for one in drawn]):.3f}")
-    CONSOLE.print(table)
+        table.append([name, *texts, float(np.median([one.alike for one in drawn]))])
+    heads = f"{title}; contact [dB]; 1.6 contact radii [dB]; full frame [dB]; SSIM .3f"
+    finish_figure("touch_pictures", figure, heads, table)
     smooth = rows[TAUGHT.format("smooth")]
     for level in LEVELS[1:]:
         other = rows[TAUGHT.format(level)]
@@ -179,7 +184,7 @@ def _draw(presses: list[HeldOut], drawn: list[Drawn], path: Path) -> None:
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("what", nargs="*", default="all", choices=["all", "r15", "fots"])
     parser.add_argument("--every", type=int, default=1, help="one press in so many")
     parser.add_argument("--picture", type=Path)

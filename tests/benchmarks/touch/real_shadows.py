@@ -8,7 +8,6 @@ one, by the law that calibrations take.
 """
 
 import io
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -18,7 +17,6 @@ import cv2
 import numpy as np
 from PIL import Image
 from rich.console import Console
-from rich.table import Table
 
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.bench.sensor import TactileSensor
@@ -27,6 +25,7 @@ from harness.sim.optics.optics import Optics
 from harness.sim.optics.published_pack import read_published
 from harness.sim.optics.shadow import ShadowTable, cast_shadows
 from harness.sim.optics.shadow_image import darkened, darkening
+from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.oracles.published_shadow import (
     OTHER,
     PITCH,
@@ -52,35 +51,34 @@ def main() -> None:
     data = find_shared_data()
     if data is None:
         raise SystemExit(WHY_NOT)
-    if "speed" in sys.argv[1:]:
-        CONSOLE.print(speed(data / "tactile/taxim"))
+    parser = benchmark_parser(__doc__)
+    parser.add_argument("what", nargs="?", choices=["speed", "law"])
+    what = parser.parse_args().what
+    if what == "speed":
+        speed(data / "tactile/taxim")
         return
-    if "law" in sys.argv[1:]:
-        CONSOLE.print(law_of_depths(shadow_table(data / "tactile/taxim/gelsight_lab")))
+    if what == "law":
+        law_of_depths(shadow_table(data / "tactile/taxim/gelsight_lab"))
         return
     taxim = data / "tactile/taxim"
     presses = {name: published_press(taxim, name) for name in TOPS}
     lists = shadow_table(taxim / "gelsight_lab")
-    table = Table(title="with shadows, from the other object's pictures: own pixels / frame, dB")
-    table.add_column("", justify="left")
     rows: dict[str, list[str]] = {}
     for name, press in presses.items():
-        table.add_column(name, justify="right")
         other = presses[OTHER[name]]
         own = press.own(other.background)
         rows.setdefault("the shadow's own pixels", []).append(f"{int(own.sum())}")
         for words, drawn, of in _ways(press, other, lists):
             pair = f"{psnr(drawn, of, own):.2f} / {psnr(drawn, of):.2f}"
             rows.setdefault(words, []).append(pair)
-    for words, cells in rows.items():
-        table.add_row(words, *cells)
-    CONSOLE.print(table)
+    heads = "; ".join(("predicted from the other object's pictures: own pixels / frame", *presses))
+    finish_figure("touch_pictures", "shadows", heads, [(words, *cells) for words, cells in rows.items()])
 
 
-def speed(taxim: Path) -> str:
+def speed(taxim: Path) -> None:
     """Milliseconds of the processor, 640 x 480: colours of the fast level, and what shadows take besides."""
     cv2.setNumThreads(1)
-    said = []
+    rows = []
     for name in TOPS:
         press = published_press(taxim, name)
         background: ByteArray = np.clip(press.background, 0.0, 255.0).astype(np.uint8)
@@ -94,11 +92,9 @@ def speed(taxim: Path) -> str:
         taken = shadows()[0]
         ways = (partial(optics.render, deep), shadows, partial(darkened, plain, taken))
         colour, thrown, laid = (_milliseconds(way) for way in ways)
-        said.append(
-            f"{name}: colours {colour:.1f} ms, shadows thrown {thrown:.1f} and laid over {laid:.1f}: "
-            f"{colour + thrown + laid:.1f} together"
-        )
-    return "\n".join(said)
+        rows.append((name, colour, thrown, laid, colour + thrown + laid))
+    heads = "press; colours [CPU ms] .1f; shadows thrown .1f; shadows laid over .1f; together .1f"
+    finish_figure("touch_pictures", "time of shadows", heads, rows)
 
 
 def _milliseconds(way: Callable[[], object]) -> float:
@@ -111,7 +107,7 @@ def _milliseconds(way: Callable[[], object]) -> float:
     return 1e3 * float(np.median(took))
 
 
-def law_of_depths(published: ShadowTable) -> Table:
+def law_of_depths(published: ShadowTable) -> None:
     """Grey levels rms by which rows that follow from the deepest one are off the published ones."""
     depths = 0.4 + 0.1 * np.arange(published.lengths.shape[2])
     lists = _by_cell(published)
@@ -122,11 +118,7 @@ def law_of_depths(published: ShadowTable) -> Table:
         "longer in proportion, darker with the square root": (1.0, 0.5),
         "longer and darker in proportion": (1.0, 1.0),
     }
-    table = Table(
-        title="eight depths from the deepest, over all samples that either has", title_justify="left"
-    )
-    table.add_column("law")
-    table.add_column("grey levels rms", justify="right")
+    rows = []
     for words, (longer, darker) in kinds.items():
         left = [
             _follows(cell[-1], depths[k] / depths[-1], longer, darker, len(cell[k]))
@@ -135,8 +127,9 @@ def law_of_depths(published: ShadowTable) -> Table:
             if len(cell[-1]) > _LEAST
             for k in range(len(depths) - 1)
         ]
-        table.add_row(words, f"{np.sqrt(np.mean(np.concatenate(left) ** 2)):.1f}")
-    return table
+        rows.append((words, float(np.sqrt(np.mean(np.concatenate(left) ** 2)))))
+    heads = "law, eight depths predicted from the deepest; rms [grey levels] .1f"
+    finish_figure("touch_pictures", "law of depths", heads, rows)
 
 
 def _by_cell(table: ShadowTable) -> list[list[np.ndarray]]:

@@ -5,14 +5,12 @@ has an exposure, a white balance, a black level, noise and JPEG of its own. *Off
 true one, less one; *z* that in standard errors.
 """
 
-import argparse
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray
-from harness.commands.output import ANSWERS
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.vision.render import open_vision
 from harness.objectfile.vision.view import camera_for, light_for, turned
@@ -21,7 +19,24 @@ from harness.picture.live_picture import compare_live
 from harness.picture.srgb import bytes_from_linear
 from harness.sim.light.appearance_source import appearance_of
 from harness.sim.light.direct_image import LitObject
+from tests.benchmarks.results import benchmark_parser, finish_figure, spread
 
+QUANTITIES = (
+    "relative error of the worst channel's gain",
+    "the same in stated standard errors",
+    "error of the worst channel's offset, linear light",
+    "relative error of the worst gain, exact rays",
+    "the same in stated standard errors, exact rays",
+    "PSNR over the object after the fit [dB]",
+    "the same, exact rays [dB]",
+    "PSNR before the fit [dB]",
+    "SSIM over the object",
+    "overlap of outlines from the bench alone",
+    "overlap of outlines from colours",
+    "time of the fit [ms]",
+    "time of the mask [ms]",
+    "time of the difference [ms]",
+)
 _BENCH = np.array([0.10, 0.12, 0.16])
 _NOISE = 0.006
 
@@ -39,8 +54,8 @@ def photograph(image: LinearImage, gain: FloatArray, black: FloatArray, seed: in
 
 
 def main() -> None:
-    """Print a line a view, and what all say."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Print or write the errors over the views."""
+    parser = benchmark_parser(__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("mesh")
     parser.add_argument("--views", type=int, default=8)
@@ -74,10 +89,8 @@ def main() -> None:
                 *(1e3 * found[0].seconds[part] for part in ("fit", "mask", "difference")),
             ]
         )
-    heads = "off z black off_exact z_exact dB dB_exact dB_unfitted SSIM IoU_bench IoU_colours fit mask apart"
-    for head, column in zip(heads.split(), np.array(rows).T, strict=True):
-        least, middle, most = np.quantile(column, (0.0, 0.5, 1.0))
-        ANSWERS.print(f"{head:12s} median {middle:8.4f}  least {least:8.4f}  most {most:8.4f}")
+    table = zip(QUANTITIES, map(spread, np.array(rows).T), strict=True)
+    finish_figure("vision", "camera", f"quantity; median (range) of {asked.views} views .3g", table)
 
 
 if __name__ == "__main__":

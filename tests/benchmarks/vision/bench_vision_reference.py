@@ -11,7 +11,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 
 from harness.authoring.vision.data import around
 from harness.basics.arrays import ByteArray
@@ -22,8 +21,8 @@ from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import Appearance
 from harness.sim.light.appearance_source import appearance_of
 from harness.sim.light.direct_image import LitObject
-
-CONSOLE = Console(width=130, highlight=False, emoji=False)
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 
 LIGHT = DirectionalLight(np.array([0.9, -0.8, 1.0]))
 WAY = np.array([0.68, -0.58, 0.45])
@@ -34,7 +33,7 @@ BEHIND = 1.0
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser()
+    parser = benchmark_parser(__doc__)
     parser.add_argument("objects", nargs="*", default=["builtin:mug"])
     parser.add_argument("--units", default="m")
     parser.add_argument("--size", type=int, default=256)
@@ -44,57 +43,49 @@ def main() -> None:
     parser.add_argument("--bounces", type=int, default=2)
     parser.add_argument("--sheet", type=Path)
     given = parser.parse_args()
-    rows = [measure(name, given) for name in given.objects]
+    table: list[list[Cell]] = []
+    rows = [measure(name, given, table) for name in given.objects]
+    heads = (
+        "object and samples; stated noise .1e; difference, rms of linear light .1e; PSNR [dB] .1f; SSIM .4f"
+    )
+    finish_figure("vision", "direct", f"{heads}; time [CPU s] .2f", table)
     if given.sheet:
         write_png(given.sheet, np.vstack(rows))
 
 
-def measure(name: str, given: argparse.Namespace) -> ByteArray:
+def measure(name: str, given: argparse.Namespace, table: list[list[Cell]]) -> ByteArray:
     """One object: tables, and its pictures side by side."""
-    begun = time.perf_counter()
     look = appearance_of(name, given.units)
-    read = time.perf_counter() - begun
     lit = LitObject(look)
-    prepared = time.perf_counter() - begun - read
     camera = around(look.mesh, WAY / np.linalg.norm(WAY), given.size, given.size, 2.0)
     lit.render(camera.resized(8, 8), [LIGHT], 1)
-    CONSOLE.print(
-        f"{Path(name).name}: {len(look.mesh.faces)} faces, read in {read:.2f} s, sorted in {prepared:.2f} s"
-        + "".join(f"; {remark}" for remark in look.remarks)
-    )
-    shown = by_samples(lit, camera, given.samples, given.best)
+    shown, rows = by_samples(lit, camera, given.samples, given.best)
+    table += [[f"{Path(name).stem}, {row[0]}", *row[1:]] for row in rows]
     if given.paths:
         shown += by_paths(look, lit, camera, given.paths, given.bounces, given.best)
     return np.hstack(shown)
 
 
-def against(found: LinearImage, best: LinearImage) -> str:
-    """How far a picture is from a better one, in light and as shown."""
+def against(found: LinearImage, best: LinearImage) -> tuple[float, float, float]:
+    """Compare a picture with a better one: rms of linear light, PSNR in dB and SSIM as shown."""
     one, other = found.display(BEHIND), best.display(BEHIND)
-    rms = root_mean_square(found, best)
-    return f"{rms:8.1e} {psnr(one, other):6.1f} dB {ssim(one, other):6.4f}"
+    return root_mean_square(found, best), psnr(one, other), ssim(one, other)
 
 
-def by_samples(lit: LitObject, camera: Pinhole, samples: list[int], best_samples: int) -> list[ByteArray]:
+def by_samples(
+    lit: LitObject, camera: Pinhole, samples: list[int], best_samples: int
+) -> tuple[list[ByteArray], list[list[Cell]]]:
     """The direct level against its own of most samples."""
     best = lit.render(camera, [LIGHT], best_samples)
     bare = lit.render(camera, [LIGHT], best_samples, shadow=False)
-    CONSOLE.print("samples   stated noise   true      PSNR    SSIM     hits  shadow   all (s)   of one core")
+    rows: list[list[Cell]] = []
     for count in samples:
         on_core = time.process_time()
         found = lit.render(camera, [LIGHT], count)
         on_core = time.process_time() - on_core
-        noise = "-" if found.noise is None else f"{found.noise:.1e}"
-        spent = found.seconds
-        CONSOLE.print(
-            f"{count:3} x {count:<3} {noise:>10}   {against(found.image, best.image)}   "
-            f"{spent['hits']:6.3f} {spent['shadow']:6.3f} {sum(spent.values()):8.3f}   {on_core:8.3f}"
-        )
-    CONSOLE.print(
-        f"{best_samples} x {best_samples}: stated noise {best.noise:.1e}, what the others are compared with"
-    )
-    CONSOLE.print(f"without shadow                    {against(bare.image, best.image)}")
-    return [best.image.display(0.5), bare.image.display(0.5)]
+        rows.append([f"{count} x {count}", found.noise, *against(found.image, best.image), on_core])
+    rows.append(["without shadow", None, *against(bare.image, best.image), None])
+    return [best.image.display(0.5), bare.image.display(0.5)], rows
 
 
 def by_paths(
@@ -108,22 +99,16 @@ def by_paths(
     # Compiled here, not in the first row's time.
     for more in (0, bounces):
         traced.render(camera.resized(8, 8), [LIGHT], 2, bounces=more)
-    CONSOLE.print(f"Mitsuba, {traced.variant.name}: {traced.variant.because}")
-    CONSOLE.print(
-        "paths      noise   from direct  PSNR   SSIM   seconds (with the direct level's noise between)"
-    )
-    for count in paths:
-        found = traced.render(camera, [LIGHT], count)
-        CONSOLE.print(
-            f"{found.samples:5}   {found.noise:8.1e}   {against(found.image, best.image)}   "
-            f"{sum(found.seconds.values()):.2f}"
+    rows: list[list[Cell]] = []
+    for count, more in (*((count, 0) for count in paths), (paths[-1], bounces)):
+        found = traced.render(camera, [LIGHT], count, bounces=more)
+        seconds = sum(found.seconds.values())
+        rows.append(
+            [f"{found.samples}, {more} bounces", found.noise, *against(found.image, best.image), seconds]
         )
-    bounced = traced.render(camera, [LIGHT], paths[-1], bounces=bounces)
-    CONSOLE.print(
-        f"{bounced.samples:5}   {bounced.noise:8.1e}   {against(bounced.image, best.image)}   "
-        f"{sum(bounced.seconds.values()):.2f}, with {bounces} bounces: what the direct level leaves out"
-    )
-    return [found.image.display(0.5), bounced.image.display(0.5)]
+    heads = "paths a pixel; stated noise .1e; difference from the direct level .1e; PSNR [dB] .1f; SSIM .4f"
+    finish_figure("vision", f"Mitsuba, {traced.variant.name}", f"{heads}; wall time [s] .2f", rows)
+    return [found.image.display(0.5)]
 
 
 if __name__ == "__main__":

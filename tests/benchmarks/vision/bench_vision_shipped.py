@@ -11,13 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.commands.output import ANSWERS
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.vision.render import Rendered, RenderSettings, open_vision
 from harness.objectfile.vision.view import camera_for, light_for, turned
 from harness.picture.image_metrics import psnr, ssim
 from harness.sim.light.appearance_source import appearance_of
 from harness.sim.light.direct_image import LitObject
+from tests.benchmarks.results import benchmark_parser, finish_figure, spread
+from tests.docs.results import Cell
 
 OBJECTS = ("mug", "bowl", "wrench", "pitcher", "tray", "plate")
 WAYS = {
@@ -32,21 +33,24 @@ _EDGE = 3e-3
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("names", nargs="*", default=OBJECTS)
     parser.add_argument("--views", type=int, default=8)
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--repeat", type=int, default=5)
     given = parser.parse_args()
+    errors: list[list[Cell]] = []
+    parts: list[list[Cell]] = []
     for name in given.names:
-        measure(name, given)
+        measure(name, given, errors, parts)
+    heads = "object and settings; mean PSNR [dB] .2f; worst [dB] .2f; SSIM .4f; samples .0f"
+    finish_figure("vision_renderer", "error", f"{heads}; time, median (quartiles) [CPU ms] .1f", errors)
+    finish_figure("vision_renderer", "time of stages", "object and stage; median [CPU ms] .1f", parts)
 
 
-def measure(name: str, given: argparse.Namespace) -> None:
-    """One object: errors and seconds of every way to its pictures."""
-    begun = time.process_time()
+def measure(name: str, given: argparse.Namespace, errors: list[list[Cell]], parts: list[list[Cell]]) -> None:
+    """Append errors and CPU time of every setting of one object, and the time of each stage."""
     vision = open_vision(ObjectFile.open(Path("objects") / name), 1)
-    ANSWERS.print(f"{name}: {len(vision.renderer.networks.grid)} networks, {_ms(begun):.0f} ms to open")
     lit = LitObject(appearance_of(f"builtin:{name}", None, edge=_EDGE))
     first = camera_for(vision.surface, given.size, given.size)
     about, each = vision.surface.bounds.mean(axis=0), 2.0 * np.pi / given.views
@@ -59,24 +63,15 @@ def measure(name: str, given: argparse.Namespace) -> None:
         for camera, light in views * given.repeat:
             begun = time.process_time()
             found.append(vision.picture(camera, light, settings))
-            taken.append(_ms(begun))
+            taken.append(1e3 * (time.process_time() - begun))
         samples = np.mean([each.samples for each in found])
         decibels = [psnr(one, other) for one, other in zip(shown, exact, strict=True)]
         alike = np.mean([ssim(one, other) for one, other in zip(shown, exact, strict=True)])
-        low, half, high = np.quantile(taken, (0.25, 0.5, 0.75))
-        ANSWERS.print(
-            f"  {way:10} {np.mean(decibels):.2f} dB, worst {min(decibels):.2f}, SSIM {alike:.4f}; "
-            f"{samples:.0f} samples, CPU {half:.1f} ({low:.1f} to {high:.1f}) ms"
-        )
-        if way == "default":
-            parts = {
-                part: 1e3 * np.median([each.seconds[part] for each in found]) for part in found[0].seconds
-            }
-            ANSWERS.print("    " + ", ".join(f"{part} {ms:.1f} ms" for part, ms in parts.items()))
-
-
-def _ms(begun: float) -> float:
-    return 1e3 * (time.process_time() - begun)
+        quality = (float(np.mean(decibels)), min(decibels), float(alike))
+        errors.append([f"{name}, {way}", *quality, float(samples), spread(taken, 0.25, 0.75)])
+        for part in found[0].seconds if way == "default" else ():
+            took = 1e3 * float(np.median([each.seconds[part] for each in found]))
+            parts.append([f"{name}, {part}", took])
 
 
 if __name__ == "__main__":

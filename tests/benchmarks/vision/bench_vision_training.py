@@ -15,7 +15,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from rich.console import Console
 
 from harness.authoring.vision.data import HeldOutViews, held_out_pictures
 from harness.authoring.vision.metrics import BEHIND, picture_errors, reference_pictures
@@ -32,8 +31,8 @@ from harness.sim.light.appearance import Appearance
 from harness.sim.light.appearance_source import appearance_of
 from harness.sim.light.direct_image import LitObject, irradiance, sees_light
 from harness.sim.light.lambert import places_seen, radiance
-
-CONSOLE = Console(width=140, highlight=False, emoji=False)
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 
 STRICT_PLACES = 8_000_000
 """Places that networks with the paper's inputs learn from, at least."""
@@ -47,7 +46,7 @@ WAYS = {
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser()
+    parser = benchmark_parser(__doc__)
     parser.add_argument("objects", nargs="*", default=["builtin:mug"])
     parser.add_argument("--units", default="m")
     parser.add_argument("--profile", default="smoke")
@@ -61,32 +60,35 @@ def main() -> None:
     parser.add_argument("--built", type=Path, help="an ObjectFile of the object: nothing is trained")
     parser.add_argument("--sheet", type=Path)
     given = parser.parse_args()
-    rows = [measure(name, steps, given) for name in given.objects for steps in given.steps or [None]]
+    table: list[list[Cell]] = []
+    rows = [measure(name, steps, given, table) for name in given.objects for steps in given.steps or [None]]
+    heads = "object; networks; time [CPU s] .0f; mean PSNR [dB] .1f; worst [dB] .1f; object alone [dB] .1f"
+    figure = "smoke" if given.profile == "smoke" else f"profile {given.profile}"
+    finish_figure("vision_training", figure, f"{heads}; SSIM .3f", table)
     if given.sheet:
         write_png(given.sheet, np.vstack(rows))
 
 
-def measure(name: str, steps: int | None, given: argparse.Namespace) -> ByteArray:
-    """One object: its networks, and their pictures beside the exact ones."""
+def measure(name: str, steps: int | None, given: argparse.Namespace, table: list[list[Cell]]) -> ByteArray:
+    """Train or read the networks of one object, and compare their pictures with exact ones."""
     look, profile = appearance_of(name, given.units), chosen(steps, given)
     if given.built:
-        CONSOLE.print(f"{Path(name).stem}, as {given.built} has it")
-        return by_ways(look, (given.built / FILE).read_bytes(), profile, given)
+        rows, shown = by_ways(look, (given.built / FILE).read_bytes(), profile, given)
+        table += [[f"{Path(name).stem}, {row[0]}", None, None, *row[1:]] for row in rows]
+        return shown
     on_core = time.process_time()
     made = trained(look, profile, given)
     on_core = time.process_time() - on_core
-    CONSOLE.print(
-        f"{Path(name).stem}: {len(made.model.grid)} networks, {profile.networks.steps} steps of "
-        f"{profile.networks.batch}, "
-        f"{on_core:.0f} s of one core; on the clock "
-        + ", ".join(f"{part} {seconds:.0f} s" for part, seconds in made.seconds.items())
-    )
+    stem, count = f"{Path(name).stem}, {profile.networks.steps} steps", len(made.model.grid)
     if given.strict:
         of = profile.networks
         size = replace(of.size, kind="osf")
         strict = replace(profile, networks=replace(of, size=size, places=max(of.places, STRICT_PLACES)))
-        CONSOLE.print(f"  told no more than the paper's {line(trained(look, strict, given).errors)}")
-    return by_ways(look, vision_graph(made.model).SerializeToString(), profile, given)
+        errors = quality(trained(look, strict, given).errors)
+        table.append([f"{stem}, the paper's inputs", count, None, *errors])
+    rows, shown = by_ways(look, vision_graph(made.model).SerializeToString(), profile, given)
+    table += [[f"{stem}, {row[0]}", count, on_core, *row[1:]] for row in rows]
+    return shown
 
 
 def trained(look: Appearance, profile: VisionProfile, given: argparse.Namespace) -> AuthoredVision:
@@ -109,16 +111,16 @@ def chosen(steps: int | None, given: argparse.Namespace) -> VisionProfile:
     return replace(profile, networks=replace(profile.networks, **others))
 
 
-def line(errors: Mapping[str, float]) -> str:
-    """Errors as they are printed."""
-    whole, worst, alone, alike = (
-        errors[name] for name in ("psnr_db", "psnr_db_worst", "psnr_db_object", "ssim")
-    )
-    return f"{whole:6.2f} dB, worst {worst:6.2f}, object alone {alone:6.2f}, ssim {alike:.4f}"
+def quality(errors: Mapping[str, float]) -> list[float]:
+    """List PSNR, worst PSNR and PSNR of the object alone in dB, and SSIM."""
+    return [errors[name] for name in ("psnr_db", "psnr_db_worst", "psnr_db_object", "ssim")]
 
 
-def by_ways(look: Appearance, data: bytes, profile: VisionProfile, given: argparse.Namespace) -> ByteArray:
-    """What settings of the renderer make of the same networks; pictures of the default."""
+def by_ways(
+    look: Appearance, data: bytes, profile: VisionProfile, given: argparse.Namespace
+) -> tuple[list[list[Cell]], ByteArray]:
+    """Measure the same networks by every setting of the renderer; pictures of the default."""
+    rows: list[list[Cell]] = []
     lit = LitObject(look)
     held_out = held_out_pictures(look.mesh, profile.pictures, profile.side, profile.side, given.seed)
     exact = reference_pictures(lit, held_out, profile.samples)
@@ -127,16 +129,12 @@ def by_ways(look: Appearance, data: bytes, profile: VisionProfile, given: argpar
     for way, settings in WAYS.items():
         views = zip(held_out.cameras, held_out.lights, strict=True)
         drawn[way] = [renderer.render(camera, light, settings).image for camera, light in views]
-        each = [difference(a, b) for a, b in zip(drawn[way], drawn["default"], strict=True)]
-        apart = 255.0 * np.sqrt(np.mean(each))
-        errors = picture_errors(exact, drawn[way])
-        CONSOLE.print(f"  {way:12} {line(errors)}, from the default {apart:.2f}/255")
+        rows.append([way, *quality(picture_errors(exact, drawn[way]))])
     for side in (3, 5):
         limit = [one_ray(lit, camera, light, side) for camera, light in _pairs(held_out)]
-        CONSOLE.print(
-            f"  exact colours, one ray a pixel, coverage {side}: {line(picture_errors(exact, limit))}"
-        )
-    return np.hstack([beside(exact[0], drawn["default"][0]), beside(exact[-1], drawn["default"][-1])])
+        rows.append([f"exact light, coverage {side}", *quality(picture_errors(exact, limit))])
+    shown = np.hstack([beside(exact[0], drawn["default"][0]), beside(exact[-1], drawn["default"][-1])])
+    return rows, shown
 
 
 def one_ray(lit: LitObject, camera: Pinhole, light: DirectionalLight, side: int) -> LinearImage:
@@ -160,12 +158,6 @@ def one_ray(lit: LitObject, camera: Pinhole, light: DirectionalLight, side: int)
 
 def _pairs(held_out: HeldOutViews) -> list[tuple[Pinhole, DirectionalLight]]:
     return list(zip(held_out.cameras, held_out.lights, strict=True))
-
-
-def difference(one: LinearImage, other: LinearImage) -> float:
-    """Mean square over pixels and channels, of light as shown before white, 0 to 1."""
-    apart = one.display(BEHIND).astype(np.float64) - other.display(BEHIND)
-    return float(np.mean((apart / 255.0) ** 2))
 
 
 def beside(exact: LinearImage, found: LinearImage) -> ByteArray:
