@@ -101,7 +101,7 @@ def _command() -> str:
     words = [word for word in sys.orig_argv[1:] if word != WRITE]
     if Path(words[0]).is_absolute():
         words[0] = os.path.relpath(words[0], ROOT)
-    return "python " + shlex.join(words)
+    return ("PYTHONPATH=. " if "PYTHONPATH" in os.environ else "") + "python " + shlex.join(words)
 
 
 def _git(*words: str) -> str:

@@ -67,6 +67,9 @@ class Page(_Strict):
     schema_: Literal[1] = Field(1, alias="schema")
     title: str
     introduction: str
+    terms: dict[str, str] = {}
+    """Meaning of the words that the tables use."""
+
     machine: str = ""
     """Computer of the figures that name none."""
 
@@ -107,6 +110,8 @@ def pages() -> dict[str, str]:
 
 def _rendered(page: Page) -> Iterator[str]:
     yield from (f"# {page.title}", "", NOTE, "", page.introduction)
+    if page.terms:
+        yield from ("", *(f"- *{term}*: {meaning}" for term, meaning in page.terms.items()))
     if page.machine:
         yield from ("", f"Machine: {page.machine}.")
     previous = None

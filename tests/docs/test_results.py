@@ -30,6 +30,14 @@ def test_every_page_has_data() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_an_introduction_has_two_sentences_and_a_conclusion_one(name: str) -> None:
+    page = read_page(name)
+    assert len(re.findall(r"[.?](?= |$)", page.introduction)) <= 2
+    for figure in page.figures:
+        assert len(re.findall(r"[.?](?= |$)", figure.conclusion)) == 1, figure.id
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_every_figure_states_its_command_and_commit(name: str) -> None:
     figures = read_page(name).figures
     assert max(Counter(figure.id for figure in figures).values()) == 1
