@@ -11,7 +11,7 @@ SOUND := pipewire wireplumber pipewire-alsa libportaudio2
 # Objects of ours and what each is made of.
 OBJECTS := mug:ceramic bowl:ceramic plate:ceramic pitcher:polycarbonate tray:wood wrench:steel
 
-.PHONY: help install demo demo-shape objectfiles test slow hunt lint types contracts reference results bench tables sound clean
+.PHONY: help install demo demo-shape objectfiles test slow hunt lint types contracts data reference results bench tables sound clean
 
 help: ## what can be asked for
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -72,6 +72,9 @@ types: $(DEV)
 
 contracts: $(DEV)
 	@$(BIN)/lint-imports
+
+data: $(DEV) ## the public data of the tests (75 MB, once), to TOUCHSTONE_DATA or the user's cache
+	@$(BIN)/python -m tests.support.fetch_data
 
 reference: $(DEV) ## docs/reference, from the models and the tables
 	@$(BIN)/python -m tests.docs.reference

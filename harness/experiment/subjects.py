@@ -1,10 +1,11 @@
 """The objects that tables and cost curves are measured on: our own, and real meshes where they are."""
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
 from harness.basics.mesh import Mesh
-from harness.basics.store import digest
+from harness.basics.store import default_folder, digest
 from harness.bench.scene import SceneFile, scene_from_options
 from harness.objects.household import MATERIALS
 
@@ -16,10 +17,21 @@ REAL = {
 """Real meshes: file under the data folder, units, material."""
 
 
+def find_data_folder() -> Path:
+    """Return the folder of public data, which may be absent.
+
+    TOUCHSTONE_DATA names it; otherwise it is ``shared/data`` beside the checkout if that exists, else
+    ``data`` in the user's cache directory.
+    """
+    named = os.environ.get("TOUCHSTONE_DATA")
+    beside = Path(__file__).parents[3] / "shared" / "data"
+    return Path(named) if named else beside if beside.is_dir() else default_folder() / "data"
+
+
 def objects(
     data: Path | None, builtin_only: bool = False, more: Mapping[str, tuple[str, str, str]] | None = None
 ) -> dict[str, SceneFile]:
-    """Scenes by the object's name: ours, and the real ones where the data is there.
+    """Return scenes by the object's name: ours, and the real ones whose mesh file is present.
 
     Args:
         data: the data folder; None where it is not there.
@@ -32,6 +44,7 @@ def objects(
     real = {
         name: scene_from_options(str(data / file), material, units)
         for name, (file, units, material) in {**REAL, **(more or {})}.items()
+        if (data / file).is_file()
     }
     return {**scenes, **real}
 

@@ -5,7 +5,7 @@ household objects, none prepared by hand, and prints a table. Stop it and start 
 what ended well stays as it is, and a run that failed or was cut off is resumed.
 With ``--replay`` the recordings made before are estimated again, by the estimator as it is now.
 
-The data is found as in the tests: TOUCHSTONE_DATA, or ../shared/data.
+The data is found as in the tests: fetched by `make data`, or named by TOUCHSTONE_DATA.
 """
 
 import json

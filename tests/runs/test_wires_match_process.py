@@ -41,7 +41,7 @@ from mocks.world.gap_draw import GapDraw
 from mocks.world.world import World
 from tests.support import sessions as session_of
 from tests.support.localization import answer, dials, estimate
-from tests.support.real_data import find_shared_data
+from tests.support.real_data import WHY_NOT, find_shared_data
 from tests.support.whole_run import copied, touch_scene
 
 pytestmark = [
@@ -171,5 +171,5 @@ def test_a_run_over_every_wire_reads_what_the_bench_in_process_reads(tmp_path: P
 def test_each_object_of_the_table(name: str, tmp_path: Path) -> None:
     scenes = objects(find_shared_data())
     if name not in scenes:
-        pytest.skip("real data not found: put it at ../shared/data or name its folder in TOUCHSTONE_DATA")
+        pytest.skip(WHY_NOT)
     compare(name, scene_of(Cell(name, "close", GAP, "known", SEED), scenes[name]), tmp_path)

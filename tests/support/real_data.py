@@ -1,14 +1,13 @@
-"""Where the real data is."""
+"""Find the real data."""
 
-import os
 from pathlib import Path
 
-BESIDE = Path(__file__).parents[3] / "shared" / "data"
-WHY_NOT = "real data not found: put it at ../shared/data or name its folder in TOUCHSTONE_DATA"
+from harness.experiment.subjects import find_data_folder
+
+WHY_NOT = "real data not found: run `make data`, or name its folder in TOUCHSTONE_DATA"
 
 
 def find_shared_data() -> Path | None:
-    """The folder of real data, from TOUCHSTONE_DATA or beside the checkout; None where absent."""
-    named = os.environ.get("TOUCHSTONE_DATA")
-    folder = Path(named) if named else BESIDE
+    """Return the folder of real data; None if it is absent or its fetching did not end."""
+    folder = find_data_folder()
     return folder if (folder / "MANIFEST.md").exists() else None

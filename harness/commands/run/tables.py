@@ -1,6 +1,5 @@
 """``touchstone tables``: what a paper would print, measured on the mocked bench."""
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -24,7 +23,7 @@ def tables(
     seeds: Annotated[int, typer.Option(help="Runs of each object and condition.", min=1, max=1000)] = 10,
     first_seed: Annotated[int, typer.Option(help="The first of them; below 1000 is for development.")] = 2000,
     data: Annotated[
-        Path | None, typer.Option(help="Folder of the real meshes; TOUCHSTONE_DATA or ../shared/data.")
+        Path | None, typer.Option(help="Folder of the real meshes. Default: TOUCHSTONE_DATA.")
     ] = None,
     only: Annotated[list[str] | None, typer.Option(help="Only this object; may be given again.")] = None,
     spacing: Annotated[list[str] | None, typer.Option(help="close or spread; both if left out.")] = None,
@@ -76,18 +75,17 @@ def tables(
     from harness.bench.gap import load_gap
     from harness.commands.scenes import with_assignments
     from harness.experiment.lookup import named
-    from harness.experiment.subjects import objects
+    from harness.experiment.subjects import REAL, find_data_folder, objects
     from harness.experiment.tables import by_object, key_of, measure, require_same_keys, rows, table_of
 
     kind = named(context.info_name or "")
     measured = table_of(kind)
     out = out or Path("runs/tables") / kind.name
-    named_folder = os.environ.get("TOUCHSTONE_DATA")
-    shared = Path(named_folder) if named_folder else Path.cwd().parent / "shared" / "data"
-    folder = data or (shared if (shared / "meshes").is_dir() else None)
-    if folder is None:
-        warn("real meshes not found (--data, TOUCHSTONE_DATA or ../shared/data): built-in objects only")
+    folder = data or find_data_folder()
     scenes = objects(folder, more=measured.subjects)
+    absent = [name for name in (*REAL, *measured.subjects) if name not in scenes]
+    if absent:
+        warn(f"left out, no mesh of it in {folder} (--data or TOUCHSTONE_DATA names it): {', '.join(absent)}")
     for name in only or []:
         if name not in scenes:
             raise WrongUse(f"no object {name!r} in this table; {nearest(name, scenes)}")

@@ -2,7 +2,7 @@
 
 Run as ``PYTHONPATH=. python tests/benchmarks/scale/bench_known_sizes.py --recordings FOLDER``: one look and
 ten contacts of each mesh and seed, 10 s a run; the recordings are kept and answered again by the next call.
-The meshes are read from TOUCHSTONE_DATA or ../shared/data.
+The meshes are read from the folder that TOUCHSTONE_DATA names; `make data` lacks the drill.
 """
 
 from collections import defaultdict

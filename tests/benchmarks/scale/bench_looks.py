@@ -1,7 +1,7 @@
 """One look at each of the table's objects: sized by its shape, by its outline alone, by the outline's box.
 
 Run as ``PYTHONPATH=. python tests/benchmarks/scale/bench_looks.py [--seeds 10] [--first-seed 2000]
-[--gap unplaced]``; a second a look. The real meshes are taken from TOUCHSTONE_DATA or ../shared/data.
+[--gap unplaced]``; a second a look. The real meshes are fetched by `make data`, or named by TOUCHSTONE_DATA.
 """
 
 from contextlib import closing, suppress

@@ -5,7 +5,7 @@ beside those of a free beam, of the struck structure from its free decay and fro
 the three blows beside a spline and a trapezoid, and process seconds. ``--out FILE.png`` draws the
 responses with what was found in them.
 
-The data is found as in the tests: TOUCHSTONE_DATA, or ../shared/data.
+The data is found as in the tests: fetched by `make data`, or named by TOUCHSTONE_DATA.
 """
 
 import time

@@ -84,3 +84,5 @@ def test_an_experiment_may_have_real_objects_of_its_own(tmp_path: Path) -> None:
     more = {"ball": ("ball.stl", "m", "plastic")}
     assert set(objects(tmp_path, more=more)) == {*objects(tmp_path), "ball"}
     assert "ball" not in objects(None, more=more)
+    (tmp_path / "ball.stl").unlink()
+    assert objects(tmp_path, more=more) == objects(tmp_path)

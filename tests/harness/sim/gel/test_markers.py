@@ -1,6 +1,5 @@
 """Printed dots: the elastic layer against its equations and finite elements, and what any press obeys."""
 
-import gzip
 from dataclasses import replace
 from pathlib import Path
 
@@ -242,8 +241,8 @@ def dome(shared_data: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
     def read(case: str) -> tuple[FloatArray, FloatArray]:
         parts = []
         for axis in "xyz":
-            with gzip.open(shared_data / f"tactile/taxim/fem_markers/dome_{case}_0.3_{axis}.txt.gz") as lines:
-                parts.append(np.loadtxt(lines, skiprows=1))
+            file = next((shared_data / "tactile/taxim/fem_markers").glob(f"dome_{case}_0.3_{axis}.txt*"))
+            parts.append(np.loadtxt(file, skiprows=1))
         return parts[0][:, 1:4], np.stack([part[:, 4] for part in parts], axis=1)
 
     places, pressed = read("dz")

@@ -175,7 +175,7 @@ def test_a_file_that_says_no_colour_is_grey_and_says_so(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "units"),
     [
-        ("meshes/ycb_sim/035_power_drill/035_power_drill.obj", "m"),
+        ("meshes/ycb_ocrtoc/scissors/textured.obj", "m"),
         ("meshes/ycb_isaac/025_mug/textured.obj", "cm"),
     ],
 )

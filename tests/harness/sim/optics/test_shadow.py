@@ -12,6 +12,7 @@ from harness.basics.errors import CalibrationRefused, OutOfDomain
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.optics.kernels import change_exactly
 from harness.sim.optics.shadow import Beyond, ShadowTable, cast_shadows, rim
+from harness.sim.optics.shadow_file import read_shadow_table
 from harness.sim.optics.shadow_image import SOFTNESS, darkened, darkening
 from harness.sim.optics.tactile_calibration import shipped_calibration
 
@@ -49,19 +50,13 @@ def test_the_published_shadows_are_drawn(shared_data: Path, name: str) -> None:
     """
     taxim = shared_data / "tactile/taxim"
     with np.load(taxim / "gelsight_lab/polycalib.npz", allow_pickle=False) as published:
-        colours = np.stack([published[f"grad_{c}"] for c in "rgb"], axis=-1)
-    with np.load(taxim / "gelsight_lab/shadowTable_plain.npz", allow_pickle=False) as published:
-        # The program that made the pictures adds six rows to a depth counted from 0.4 mm.
-        table = ShadowTable(
-            published["directions"],
-            published["lengths"].astype(np.int64),
-            published["values"].astype(np.float64),
-            -0.2e-3,
-        )
+        colours = np.stack([published[f"grad_{c}"] for c in "bgr"], axis=-1)
+    # The program that made the pictures adds six rows to a depth counted from 0.4 mm.
+    table = read_shadow_table(taxim / "gelsight_lab/shadowTable.npz", shallowest=-0.2e-3)
     gel = cv2.GaussianBlur(np.load(taxim / "gelsight_lab/gelmap5.npy").astype(np.float64), (5, 5), 0)
     surface = np.load(taxim / f"published_results/{name}_height.npy").astype(np.float64)
     plain, wanted = (
-        np.asarray(cv2.imread(str(taxim / f"published_results/{name}_{kind}.jpg")), dtype=np.float64)
+        np.asarray(cv2.imread(str(taxim / f"published_results/{name}_{kind}.jpg")), np.float64)[..., ::-1]
         for kind in ("sim", "shadow")
     )
     change = np.empty((480, 640, 3))

@@ -62,8 +62,11 @@ def test_a_plain_file_says_the_same(tmp_path: Path) -> None:
 
 def test_taxims_own_table_is_read(shared_data: Path) -> None:
     lab = shared_data / "tactile/taxim/gelsight_lab"
-    published, plain = (read_shadow_table(lab / f"shadowTable{kind}.npz") for kind in ("", "_plain"))
+    published = read_shadow_table(lab / "shadowTable.npz")
     assert published.lengths.shape == (3, 63, 9)
+    if not (lab / "shadowTable_plain.npz").exists():
+        pytest.skip("shadowTable_plain.npz is absent: `make data` does not fetch converted files")
+    plain = read_shadow_table(lab / "shadowTable_plain.npz")
     assert np.array_equal(published.lengths, plain.lengths)
     assert np.abs(published.values - plain.values).max() < 1e-5  # the plain one is in single precision
 
