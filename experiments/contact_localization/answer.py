@@ -29,7 +29,7 @@ from harness.basics.errors import FitRefused, MeshRefused, WrongUse
 from harness.basics.symmetry import SymmetryGroup, find_symmetries
 from harness.bench.bench_errors import BenchErrors
 from harness.effects.accuracy import Accuracy, Level, Setting
-from harness.effects.touch_file_effects import SHAPES as TOUCH
+from harness.effects.touch import SHAPES as TOUCH
 from harness.experiment.solving import Solved
 from harness.picture.square_pixels import aspect_stated
 from harness.recording.observation import Observation, in_time, observe_step

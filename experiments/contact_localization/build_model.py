@@ -13,12 +13,11 @@ from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
-from harness.effects.catalogue import EFFECTS
+from harness.effects.catalogue import EFFECTS, scene_levels
 from harness.effects.effect import knobs_of
 from harness.effects.explain import without_sound
-from harness.effects.file_levels import scene_levels
 from harness.effects.scene_object import known_file
-from harness.effects.touch_file_effects import SHAPES
+from harness.effects.touch import SHAPES
 from harness.experiment.object_modes import ReadFile, carried_by, object_modes
 from harness.recording.run_folder import RunFiles
 from harness.sim.optics.tactile_calibration import TactileCalibration

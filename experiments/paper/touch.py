@@ -40,7 +40,7 @@ from harness.basics.errors import OutOfDomain
 from harness.basics.mesh import Mesh
 from harness.basics.store import digest
 from harness.bench.sensor import GELSIGHT_R15
-from harness.effects.touch_drawing import optics
+from harness.effects.touch import prepare_optics
 from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.runtime import Network
@@ -115,7 +115,7 @@ class TouchBench:
     @cached_property
     def optics(self) -> Optics:
         """From maps to pictures, for the reference and for every map of a method alike."""
-        return optics(self.calibration, "fast", self.places.sensor)
+        return prepare_optics(self.calibration, "fast", self.places.sensor)
 
     def picture(self, indentation: AnyArray) -> ByteArray:
         """``(rows, columns, 3)`` of ``(rows, columns)`` m."""

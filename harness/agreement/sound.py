@@ -139,8 +139,8 @@ def compare_sound(
     if not len(peaks):
         return SenseResiduals("sound", source, (), "no resonance stood out of the noise in two strikes")
     try:
-        stored = subject.simulated("audio", source, ("object.modes",), {})["object.modes"]
-        modes, error = from_arrays(stored), gain_error(subject, source)
+        simulated = subject.simulated("audio", source, ("object.modes",), {})
+        modes, error = from_arrays(simulated.values["object_modes"]), gain_error(subject, source)
     except TouchstoneError as refusal:
         return SenseResiduals("sound", source, (), str(refusal))
     resonances = resonance_residual(struck[-1].step, peaks, np.asarray(modes.frequencies), noise)

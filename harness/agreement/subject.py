@@ -1,10 +1,10 @@
 """What readings are compared with: a run's own object as it carries it, or an ObjectFile in its place."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 from harness.agreement.agreement import Source
 from harness.basics.arrays import FloatArray
@@ -14,11 +14,11 @@ from harness.basics.store import Store, default_folder
 from harness.bench.scene import SceneFile
 from harness.bench.scene_objectfile import OBJECTFILE
 from harness.effects.accuracy import Level
-from harness.effects.catalogue import EFFECTS
-from harness.effects.effect import Facts
+from harness.effects.catalogue import DIALS, EFFECTS, NETWORK, networks_of
+from harness.effects.effect import Facts, parameter_name, quantity_name
 from harness.effects.evaluate import Evaluation, evaluate
-from harness.effects.file_levels import DIALS, NETWORK, networks_of
 from harness.effects.plan import Plan, default_accuracy, plan
+from harness.effects.quantities import Quantities
 from harness.objectfile.entries import Modality
 from harness.objectfile.file import ObjectFile
 from harness.picture.square_pixels import aspect_stated
@@ -43,7 +43,7 @@ class Subject:
     """of the simulation's dials, but for the one that chooses between network and reference; what they leave
     out is at its default."""
     _store: Store = field(default_factory=lambda: Store(default_folder()), repr=False)
-    _made: dict[tuple[Modality, Source], dict[str, Any]] = field(default_factory=dict, repr=False, init=False)
+    _made: dict[tuple[Modality, Source], Quantities] = field(default_factory=dict, repr=False, init=False)
 
     @cached_property
     def base_from_object(self) -> FloatArray:
@@ -56,15 +56,15 @@ class Subject:
         return ("network", "reference") if has else ("reference",)
 
     def simulated(
-        self, sense: Modality, source: Source, wanted: Sequence[str], given: Mapping[str, Any]
+        self, sense: Modality, source: Source, wanted: Sequence[str], given: Quantities
     ) -> Evaluation:
-        """Quantities of the catalogue, of this object.
+        """Compute quantities of the catalogue for this object.
 
         Args:
             sense: whose dial ``source`` turns.
             source: the network or the reference.
             wanted: their names.
-            given: further sources, by name.
+            given: further sources.
 
         Raises:
             WrongUse: the network is of another gel or another object.
@@ -79,31 +79,29 @@ class Subject:
         if (sense, source) not in self._made:
             lasting = _of_object(chosen, given)
             made = evaluate(plan(EFFECTS, facts, lasting, levels), self._sources(), self._store)
-            self._made[sense, source] = {name: made[name] for name in lasting}
-        known_values = self._made[sense, source]
-        left = replace(
-            chosen,
-            ran=tuple(step for step in chosen.ran if step.effect.provides not in known_values),
-            sources=(*chosen.sources, *known_values),
-        )
-        return evaluate(left, {**self._sources(), **given, **known_values}, self._store)
+            computed = {parameter_name(name): made[name] for name in lasting}
+            self._made[sense, source] = cast(Quantities, computed)
+        sources: Quantities = {**self._sources(), **given, **self._made[sense, source]}
+        return evaluate(chosen, sources, self._store)
 
-    def _sources(self) -> dict[str, Any]:
-        sources: dict[str, Any] = {
-            "object.mesh": self.mesh,
-            "object.wall": self.scene.object.wall,
-            "object.material": self.material,
+    def _sources(self) -> Quantities:
+        sources: Quantities = {
+            "object_mesh": self.mesh,
+            "object_wall": self.scene.object.wall,
+            "object_material": self.material,
             "sensor": self.run.station.gel.sensor,
-            "sensor.calibration": self.run.calibration,
+            "sensor_calibration": self.run.calibration,
         }
-        return sources if self.objectfile is None else {**sources, "object.file": self.objectfile}
+        if self.objectfile is not None:
+            sources["object_file"] = self.objectfile
+        return sources
 
 
-def _of_object(chosen: Plan, given: Mapping[str, Any]) -> tuple[str, ...]:
-    """What follows from the object alone and what does not follow from it needs: it is made once."""
-    fixed, needed = set(chosen.sources) - set(given), set[str]()
+def _of_object(chosen: Plan, given: Quantities) -> tuple[str, ...]:
+    """Return the quantities that depend on the object alone and that others need: each is computed once."""
+    fixed, needed = set(chosen.sources) - set(map(quantity_name, given)), set[str]()
     for step in chosen.ran:
-        needs = {chosen.resolved(need) for need in step.effect.needs}
+        needs = {chosen.resolved(need) for need in step.needs}
         if needs <= fixed:
             fixed.add(step.effect.provides)
         else:

@@ -28,6 +28,7 @@ from harness.agreement.subject import SEEN, PressedContact, Subject, refusal_not
 from harness.basics.arrays import BoolArray, FloatArray, block_means
 from harness.basics.errors import OutOfDomain, WrongUse
 from harness.basics.geometry import inverse
+from harness.effects.quantities import Quantities
 
 _IMPROBABLE = 0.01
 """Probability below which a contact counts as one that does not fit."""
@@ -366,9 +367,8 @@ class _Search:
     def _surfaces(self, tried: Sequence[FloatArray] | FloatArray) -> FloatArray:
         """``(n, rows, columns)`` m of the gel's surface."""
         poses = np.array([twisted(self._pose, self._root @ at[:6]) for at in tried])
-        given = {"contact.gel_from_object": inverse(poses) @ self._subject.base_from_object}
-        found: FloatArray = self._subject.simulated("touch", self._source, ("touch.gel",), given)["touch.gel"]
-        return found
+        given: Quantities = {"contact_gel_from_object": inverse(poses) @ self._subject.base_from_object}
+        return self._subject.simulated("touch", self._source, ("touch.gel",), given).values["touch_gel"]
 
     def _shown(self, surface: FloatArray, at: FloatArray) -> FloatArray:
         """A surface as its picture would show it, with its gain and its skirt."""

@@ -44,7 +44,7 @@ def explain(
     from harness.bench.scene import load_scene, scene_from_options
     from harness.bench.scene_objectfile import holds_objectfile, objectfile_folder
     from harness.bench.station_file import load_station, station_path
-    from harness.effects.catalogue import EFFECTS
+    from harness.effects.catalogue import EFFECTS, scene_levels
     from harness.effects.explain import (
         as_json,
         as_table,
@@ -53,7 +53,6 @@ def explain(
         networks_in_use,
         scene_plan,
     )
-    from harness.effects.file_levels import scene_levels
     from harness.effects.plan import default_accuracy
 
     is_object = holds_objectfile(objectfile_folder(str(scene), Path.cwd()))

@@ -2,19 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import NotRequired, TypedDict
 
 from rich.table import Table
 
 from harness.bench.scene import SceneFile
 from harness.bench.sensor import TactileSensor
 from harness.effects.accuracy import Accuracy, Level
-from harness.effects.catalogue import EFFECTS
+from harness.effects.catalogue import DIALS, EFFECTS, NETWORK, SOUND_EFFECTS
 from harness.effects.effect import Facts
-from harness.effects.file_levels import DIALS, NETWORK
 from harness.effects.plan import Plan, default_accuracy, plan
 from harness.effects.scene_object import named_file
-from harness.effects.sound_effects import SOUND_EFFECTS
 from harness.objectfile.description import Description
 from harness.objectfile.entries import Modality, NetworkEntry
 
@@ -40,6 +38,23 @@ class NetworkInUse:
     errors: Mapping[str, float]  #: of its model card, by names with units, where it was never trained.
     seconds: Mapping[str, float]
     """of one query as its model card has it, by the name of the query; empty where it says none."""
+
+
+class ExplainedEffect(TypedDict):
+    """One effect of a plan."""
+
+    effect: str  #: its quantity.
+    reason: str  #: why it runs or not.
+    levels: NotRequired[dict[str, Level]]  #: of its knobs where it runs.
+    seconds: NotRequired[float | None]  #: that it took in an evaluation; None where it took none.
+    calls: NotRequired[int]  #: how often it was computed in an evaluation.
+
+
+class ExplainedPlan(TypedDict):
+    """A plan as JSON values."""
+
+    ran: list[ExplainedEffect]
+    skipped: list[ExplainedEffect]
 
 
 def scene_plan(scene: SceneFile, sensor: TactileSensor, accuracy: Accuracy | None = None) -> Plan:
@@ -70,13 +85,15 @@ def without_sound(scene: SceneFile) -> SceneFile:
     return scene.model_copy(update={"sensors": silent, "observe": observed})
 
 
-def as_json(chosen: Plan) -> dict[str, Any]:
-    """``{"ran": [{effect, reason, levels}], "skipped": [{effect, reason}]}``."""
-    ran = [
+def as_json(chosen: Plan) -> ExplainedPlan:
+    """Return a plan as JSON values."""
+    ran: list[ExplainedEffect] = [
         {"effect": step.effect.provides, "reason": step.reason, "levels": dict(step.levels)}
         for step in chosen.ran
     ]
-    skipped = [{"effect": step.effect.provides, "reason": step.reason} for step in chosen.skipped]
+    skipped: list[ExplainedEffect] = [
+        {"effect": step.effect.provides, "reason": step.reason} for step in chosen.skipped
+    ]
     return {"ran": ran, "skipped": skipped}
 
 
@@ -137,7 +154,7 @@ def networks_at(of: Description, levels: Mapping[str, Level]) -> tuple[NetworkIn
     )
 
 
-def networks_as_json(networks: tuple[NetworkInUse, ...]) -> list[dict[str, Any]]:
+def networks_as_json(networks: tuple[NetworkInUse, ...]) -> list[dict[str, object]]:
     """``[{dial, level, file, instead_of, errors, seconds}]``."""
     return [
         {

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from harness.basics.errors import WrongUse
 from harness.basics.files.named_file import nearest
 from harness.effects.accuracy import Accuracy, Knob, Level
-from harness.effects.effect import Effect, Facts, by_name, knobs_of
+from harness.effects.effect import Effect, Facts, knobs_of, needs_of
 
 
 @dataclass(frozen=True)
@@ -15,6 +15,7 @@ class PlannedEffect:
     """An effect that will run."""
 
     effect: Effect  #: itself, as its levels have it computed.
+    needs: tuple[str, ...]  #: quantities that its function is called with.
     reason: str  #: who needs it, what in the scene calls for it, and in which of several ways it runs.
     levels: Mapping[str, Level]  #: of its knobs, the first that of its choice where it has one.
 
@@ -33,7 +34,7 @@ class Plan:
 
     wanted: tuple[str, ...]  #: quantities asked for.
     ran: tuple[PlannedEffect, ...]  #: effects in the order in which they run.
-    skipped: tuple[SkippedEffect, ...]  #: every other effect of the catalogue.
+    skipped: tuple[SkippedEffect, ...]  #: every other effect of the catalogue but those that are supplied.
     aliases: Mapping[str, str]  #: quantities whose effect is bypassed, and what takes their place.
     sources: tuple[str, ...]  #: quantities that must be given.
 
@@ -49,6 +50,7 @@ class _Search:
     effects: Mapping[str, Effect]
     facts: Facts
     accuracy: Accuracy
+    supplied: frozenset[str]
     order: list[str] = field(default_factory=list)
     asked_by: dict[str, list[str]] = field(default_factory=dict)
     aliases: dict[str, str] = field(default_factory=dict)
@@ -64,13 +66,13 @@ class _Search:
         if seen:
             return
         effect = self.effects.get(quantity)
-        if effect is None:
+        if effect is None or quantity in self.supplied:
             self.sources.append(quantity)
             return
         path = (*path, quantity)
         if effect.when is None or effect.when.holds(self.facts):
             _require_way(effect, self.facts, self.accuracy)
-            for need in effect.needs:
+            for need in needs_of(effect.compute, self.supplied):
                 self.visit(need, quantity, path)
             self.order.append(quantity)
         else:
@@ -78,22 +80,30 @@ class _Search:
             self.visit(self.aliases[quantity], asked_by, path)
 
 
-def plan(effects: Sequence[Effect], facts: Facts, wanted: Iterable[str], accuracy: Accuracy) -> Plan:
-    """What would run to compute ``wanted``, without computing anything.
+def plan(
+    effects: Sequence[Effect],
+    facts: Facts,
+    wanted: Iterable[str],
+    accuracy: Accuracy,
+    supplied: Iterable[str] = (),
+) -> Plan:
+    """Plan what runs to compute ``wanted``, without computing anything.
 
     Args:
         effects: the catalogue.
         facts: of the scene and the sensor.
         wanted: quantities of the catalogue.
         accuracy: a level for every knob of the catalogue.
+        supplied: quantities that the caller gives: one that an effect provides takes the place of that
+            effect, and one that an effect can do without is used.
 
     Raises:
         WrongUse: a wanted quantity that no effect provides, or that the scene rules out; a level that
             the scene does not have what it takes for.
-        ValueError: a catalogue that is not one: circular, or two effects for one quantity.
+        ValueError: the effects need each other in a circle.
     """
-    known = {name: effect.at(accuracy) for name, effect in by_name(effects).items()}
-    search = _Search(known, facts, accuracy)
+    known = {effect.provides: effect.at(accuracy) for effect in effects}
+    search = _Search(known, facts, accuracy, frozenset(supplied))
     wanted = tuple(wanted)
     for quantity in wanted:
         if quantity not in known:
@@ -103,7 +113,7 @@ def plan(effects: Sequence[Effect], facts: Facts, wanted: Iterable[str], accurac
     skipped = tuple(
         SkippedEffect(effect, _why_not(effect, search))
         for effect in effects
-        if effect.provides not in search.order
+        if effect.provides not in search.order and effect.provides not in search.supplied
     )
     return Plan(wanted, ran, skipped, MappingProxyType(search.aliases), tuple(search.sources))
 
@@ -143,7 +153,8 @@ def _planned(effect: Effect, search: _Search) -> PlannedEffect:
         knobs = (effect.choice, *knobs)
         reasons.append(_why_this_way(effect, effect.choice, accuracy))
     levels = MappingProxyType({knob.name: accuracy[knob.name] for knob in knobs})
-    return PlannedEffect(effect, "; ".join(reasons), levels)
+    needs = needs_of(effect.compute, search.supplied)
+    return PlannedEffect(effect, needs, "; ".join(reasons), levels)
 
 
 def _why_this_way(effect: Effect, choice: Knob[Level], accuracy: Accuracy) -> str:

@@ -16,12 +16,12 @@ from harness.bench.scene import SceneFile
 from harness.bench.scene_camera import scene_lamps, scene_pinhole
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
-from harness.effects.catalogue import EFFECTS
+from harness.effects.catalogue import EFFECTS, NETWORK, scene_levels
 from harness.effects.evaluate import Evaluation, evaluate
 from harness.effects.explain import scene_plan, without_sound
-from harness.effects.file_levels import NETWORK, scene_levels
 from harness.effects.plan import Plan, default_accuracy
-from harness.effects.touch_file_effects import SHAPES as TOUCH
+from harness.effects.quantities import Quantities
+from harness.effects.touch import SHAPES as TOUCH
 from harness.experiment.experiment import Experiment, Scored
 from harness.objectfile.vision.render import Rendered
 from harness.picture.pinhole import DirectionalLight
@@ -98,12 +98,12 @@ def require_sources(
         )
 
 
-def compare(scored: Scored, given: Mapping[str, Any]) -> Comparison:
+def compare(scored: Scored, given: Quantities) -> Comparison:
     """Simulate what the scene observes at the answer, and nothing else.
 
     Args:
         scored: the answer.
-        given: what it gives the simulation, by the names of the experiment's ``gives``.
+        given: what it gives the simulation, the quantities of the experiment's ``gives``.
     """
     scene = scored.run.scene
     try:
@@ -115,7 +115,7 @@ def compare(scored: Scored, given: Mapping[str, Any]) -> Comparison:
         return replace(silent, notes=(*silent.notes, f"the object's sound is not simulated: {refusal}"))
 
 
-def _drawn_at(scored: Scored, scene: SceneFile, given: Mapping[str, Any]) -> Comparison:
+def _drawn_at(scored: Scored, scene: SceneFile, given: Quantities) -> Comparison:
     accuracy = scored.accuracy
     try:
         return _simulated(scored, scene, given, accuracy)
@@ -128,38 +128,38 @@ def _drawn_at(scored: Scored, scene: SceneFile, given: Mapping[str, Any]) -> Com
         return replace(instead, notes=(note,))
 
 
-def _simulated(scored: Scored, scene: SceneFile, given: Mapping[str, Any], accuracy: Accuracy) -> Comparison:
+def _simulated(scored: Scored, scene: SceneFile, given: Quantities, accuracy: Accuracy) -> Comparison:
     run = scored.run
     plan = scene_plan(scene, run.station.gel.sensor, accuracy)
-    sources = {**_carried(run, plan), **given}
+    sources: Quantities = {**_carried(run, plan), **given}
     return Comparison(plan, evaluate(plan, sources, Store(default_folder())))
 
 
-def _carried(run: RunFiles, plan: Plan) -> dict[str, Any]:
-    sources: dict[str, Any] = {
-        "object.mesh": run.mesh,
-        "object.wall": run.scene.object.wall,
-        "object.material": MATERIALS[run.scene.object.material],
+def _carried(run: RunFiles, plan: Plan) -> Quantities:
+    sources: Quantities = {
+        "object_mesh": run.mesh,
+        "object_wall": run.scene.object.wall,
+        "object_material": MATERIALS[run.scene.object.material],
         "sensor": run.station.gel.sensor,
-        "sensor.calibration": run.calibration,
+        "sensor_calibration": run.calibration,
         "seed": run.recording.header.seed,
     }
     shadow = shadow_of(run.calibration)
     if shadow is not None:
-        sources["sensor.shadow_table"] = shadow
+        sources["sensor_shadow_table"] = shadow
     if "object.file" in plan.sources:
-        sources["object.file"] = run.objectfile
-    return sources | camera_sources(run.scene, run.station, run.mesh, plan.sources)
+        sources["object_file"] = run.objectfile
+    return {**sources, **camera_sources(run.scene, run.station, run.mesh, plan.sources)}
 
 
-def _parts(value: Any) -> Mapping[str, Any] | None:
+def _parts(value: object) -> Mapping[str, object] | None:
     """Of a mapping, and of a picture: linear light and coverage; None of what is one thing."""
     if isinstance(value, DirectImage | Rendered):
         return {"colour": value.image.colour, "coverage": value.image.alpha}
     return value if isinstance(value, Mapping) else None
 
 
-def _described(value: Any) -> dict[str, Any]:
+def _described(value: object) -> dict[str, Any]:
     parts = _parts(value)
     if parts is not None:
         return {"parts": {str(name): _described(part) for name, part in parts.items()}}
@@ -177,7 +177,7 @@ _GREY = 1e-6
 """Relative, by which the parts of a lamp's colour may differ and still be one number."""
 
 
-def camera_sources(scene: SceneFile, station: Station, mesh: Mesh, wanted: Sequence[str]) -> dict[str, Any]:
+def camera_sources(scene: SceneFile, station: Station, mesh: Mesh, wanted: Sequence[str]) -> Quantities:
     """The sources of a picture that are wanted, in the object's frame at its nominal pose.
 
     Args:
@@ -189,12 +189,12 @@ def camera_sources(scene: SceneFile, station: Station, mesh: Mesh, wanted: Seque
     Raises:
         WrongUse: the station has no camera.
     """
-    sources: dict[str, Any] = {}
+    sources: Quantities = {}
     if "camera" in wanted:
         sources["camera"] = scene_pinhole(station, scene, mesh)
     if "camera.lights" in wanted:
         # The light of a white lamp is as strong as its colour says.
-        sources["camera.lights"] = tuple(
+        sources["camera_lights"] = tuple(
             DirectionalLight(lamp.light.direction, lamp.light.irradiance * float(lamp.colour[0]))
             for lamp in scene_lamps(scene, mesh)
         )
@@ -202,5 +202,5 @@ def camera_sources(scene: SceneFile, station: Station, mesh: Mesh, wanted: Seque
         # Loaded by those alone who follow rays on the mesh.
         from harness.sim.light.appearance_source import builtin_appearance
 
-        sources["object.appearance"] = builtin_appearance(scene.object.builtin, scene.object.drawn_scale)
+        sources["object_appearance"] = builtin_appearance(scene.object.builtin, scene.object.drawn_scale)
     return sources

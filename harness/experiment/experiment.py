@@ -19,6 +19,7 @@ from harness.cost.curve import Sample
 from harness.effects.accuracy import Accuracy, Knob, Level, Setting
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
+from harness.effects.quantities import Quantities
 from harness.experiment.solving import Budgets
 from harness.experiment.truth import Truth
 from harness.recording.run_folder import RunFiles
@@ -247,7 +248,7 @@ class Experiment(Procedure):
     result: Callable[[Scored], dict[str, Any]]
     """the answer as JSON values, keys with their units, with ``seconds`` and ``warnings``."""
     lines: Callable[[Mapping[str, Any]], list[str]]  #: the answer for people, from the whole result.
-    sources: Callable[[Scored], Mapping[str, Any]]  #: what the answer gives the comparison, by name.
+    sources: Callable[[Scored], Quantities]  #: what the answer gives the comparison.
     gives: tuple[str, ...]
     """the names of those sources; what else a scene observes is refused before anything moves."""
     report: Callable[[Scored, Any, Mapping[str, Health] | None, Path], Path] | None = None

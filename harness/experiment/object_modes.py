@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
@@ -10,11 +9,11 @@ from harness.basics.store import Store, default_folder
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
-from harness.effects.catalogue import EFFECTS
+from harness.effects.catalogue import EFFECTS, scene_levels
 from harness.effects.effect import Facts
 from harness.effects.evaluate import evaluate
-from harness.effects.file_levels import scene_levels
 from harness.effects.plan import default_accuracy, plan
+from harness.effects.quantities import Quantities
 from harness.effects.scene_object import known_file
 from harness.objectfile.file import ObjectFile
 from harness.recording.run_folder import RunFiles
@@ -48,11 +47,13 @@ def object_modes(
     """
     levels = accuracy or default_accuracy(EFFECTS).with_(scene_levels(scene))
     chosen = plan(EFFECTS, Facts(scene, station.gel.sensor), ("object.modes",), levels)
-    sources: dict[str, Any] = {
-        "object.mesh": mesh,
-        "object.wall": scene.object.wall,
-        "object.material": MATERIALS[scene.object.material],
+    sources: Quantities = {
+        "object_mesh": mesh,
+        "object_wall": scene.object.wall,
+        "object_material": MATERIALS[scene.object.material],
     }
     if "object.file" in chosen.sources:
-        sources["object.file"] = (objectfile or partial(known_file, scene, mesh))()
-    return from_arrays(evaluate(chosen, sources, Store(default_folder()))["object.modes"])
+        of = (objectfile or partial(known_file, scene, mesh))()
+        if of is not None:
+            sources["object_file"] = of
+    return from_arrays(evaluate(chosen, sources, Store(default_folder())).values["object_modes"])

@@ -25,7 +25,7 @@ from harness.bench.sensor import sensor_path, shipped_sensors
 from harness.bench.station import RunContext
 from harness.bench.station_file import Station, station_from_json
 from harness.effects.accuracy import Level
-from harness.effects.file_levels import network_levels, senses_of
+from harness.effects.catalogue import network_levels, senses_of
 from harness.effects.scene_object import known_file
 from harness.objectfile.file import ObjectFile, write_described
 from harness.objects.builtin import DESCRIPTION

@@ -20,7 +20,7 @@ from harness.bench.station_file import Station
 from harness.cli import commands, load
 from harness.effects.accuracy import Knob
 from harness.effects.catalogue import EFFECTS
-from harness.effects.effect import Effect, Facts, knobs_of
+from harness.effects.effect import Effect, Facts, knobs_of, needs_of
 from harness.effects.plan import default_accuracy, plan
 from harness.experiment.compare import CARRIED
 from harness.experiment.lookup import named
@@ -146,7 +146,7 @@ def _effects() -> list[str]:
     lines += table(("effect", "computed from", "runs", "dials", "a run can observe it"), rows)
     lines += ["", "## Other implementations", "", "Chosen by the dial of the effect.", ""]
     ways = [
-        (f"`{e.provides}`", f"`{e.choice.name}={level}`", _listed(way.needs))
+        (f"`{e.provides}`", f"`{e.choice.name}={level}`", _listed(needs_of(way.compute)))
         for e in EFFECTS
         if e.choice is not None
         for level, way in e.ways.items()

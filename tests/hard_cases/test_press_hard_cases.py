@@ -12,6 +12,7 @@ from harness.basics.geometry import rotation_about
 from harness.basics.mesh import Mesh
 from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15, TactileSensor
+from harness.effects.quantities import Quantities
 from harness.effects.touch_press import Press, press_heights, press_mesh
 from harness.sim.gel.gel import R15_SKIRT, deform, skirt_for
 from harness.sim.gel.height_file import Heights, given_heights
@@ -118,9 +119,9 @@ def test_a_flat_face_is_coloured_as_the_untouched_gel_in_any_pose(level: str) ->
     turn = rotation_about(np.array([0.6, 0.8, 0.0]), 0.3)
     mesh = Mesh(np.asarray(box.vertices) @ turn.T + 0.1, np.asarray(box.faces))
     place = contact_place(mesh, turn @ np.array([0.0, 0.0, 20e-3]) + 0.1)
-    given = {
-        "object.mesh": mesh,
-        "contact.gel_from_object": gel_from_object(place, 1e-3, 0.0, 0.0, 0.4)[None],
+    given: Quantities = {
+        "object_mesh": mesh,
+        "contact_gel_from_object": gel_from_object(place, 1e-3, 0.0, 0.0, 0.4)[None],
     }
     press = press_mesh(given, PLAIN, SCENE, [f"touch.optics={level}"])
     within = slice(50, 70), slice(70, 90)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from harness.bench.acquisition import Strike
-from harness.effects import sound_effects
+from harness.effects.catalogue import SOUND_EFFECTS
 from harness.recording.recording import Recording
 from harness.strikes import peaks as sound_analysis
 from tests.support import sessions as session_of
@@ -60,8 +60,8 @@ def count_calls(patch: pytest.MonkeyPatch) -> Counter[str]:
         own = {k: f for k, f in vars(module).items() if inspect.isfunction(f) and f.__module__ == home}
         for name, function in own.items():
             replace_everywhere(patch, name, function, counted(f"{home}.{name}", function, calls))
-    effects = sound_effects.SOUND_EFFECTS
-    assert {"object.modes", "object.sound", "room.reverberation"} <= {effect.provides for effect in effects}
+    provided = {effect.provides for effect in SOUND_EFFECTS}
+    assert {"object.modes", "object.sound", "room.reverberation"} <= provided
     return calls
 
 

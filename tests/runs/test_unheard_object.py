@@ -53,7 +53,7 @@ def unfillable(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> Modes:
         raise MeshRefused(WHY)
 
-    monkeypatch.setattr("harness.effects.sound_effects.modes_of", refuse)
+    monkeypatch.setattr("harness.effects.sound.modes_of", refuse)
     monkeypatch.setattr("harness.basics.store.Store.get", lambda *_: None)
 
 

@@ -38,7 +38,7 @@ from harness.bench.station import RunContext
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
 from harness.effects.accuracy import Setting
-from harness.effects.file_levels import scene_levels
+from harness.effects.catalogue import scene_levels
 from harness.effects.scene_object import known_object
 from harness.experiment import in_process
 from harness.experiment.experiment import Say

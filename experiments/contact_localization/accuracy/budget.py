@@ -27,8 +27,8 @@ from harness.bench.scene import SceneFile
 from harness.cost.curve import Curve
 from harness.cost.file import load
 from harness.effects.accuracy import Level, Setting
-from harness.effects.sound_effects import EDGE, SHAPES
-from harness.effects.touch_file_effects import SHAPES as TOUCH
+from harness.effects.sound import EDGE, SHAPES
+from harness.effects.touch import SHAPES as TOUCH
 from harness.experiment.solving import Budgets, Solved
 from harness.experiment.subjects import object_key
 from harness.experiment.truth import read_truth

@@ -13,11 +13,10 @@ from experiments.contact_localization.posterior.dials import (
     SPACING,
 )
 from harness.effects.accuracy import Accuracy, Knob, Level, Setting
-from harness.effects.catalogue import EFFECTS
+from harness.effects.catalogue import EFFECTS, NETWORK
 from harness.effects.effect import knobs_of
-from harness.effects.file_levels import NETWORK
-from harness.effects.sound_effects import EDGE, MODES, SHAPES
-from harness.effects.touch_file_effects import SHAPES as TOUCH
+from harness.effects.sound import EDGE, MODES, SHAPES
+from harness.effects.touch import SHAPES as TOUCH
 from harness.objectfile.entries import Modality
 
 KNOBS = (*DIALS, *knobs_of(EFFECTS))

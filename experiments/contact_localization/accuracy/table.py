@@ -40,7 +40,7 @@ from harness.basics.symmetry import SymmetryGroup, find_symmetries
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Setting
-from harness.effects.file_levels import networks_of
+from harness.effects.catalogue import networks_of
 from harness.effects.scene_object import named_file
 from harness.experiment.experiment import MeasuredCondition, Measurement
 

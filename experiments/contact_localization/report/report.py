@@ -19,11 +19,12 @@ from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import by_translations, flags_of, true_points
 from experiments.contact_localization.report.sound_report import posterior_of, sound_of
 from experiments.contact_localization.section import Localization
-from harness.basics.arrays import FloatArray, read_only
+from harness.basics.arrays import AnyArray, FloatArray, read_only
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import inverse, rotation_from_quaternion, transform, translation
 from harness.bench.device import Health
 from harness.effects.accuracy import Accuracy, Setting
+from harness.effects.quantities import Quantities
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
 from harness.recording.run_folder import RunFiles
@@ -139,7 +140,8 @@ def _contacts(
     scored: Scored, comparison: Comparison, history: tuple[Estimate | FitRefused, ...]
 ) -> tuple[ContactRow, ...]:
     count = len(history)
-    images, gels = _of_each(comparison, "touch.image", count), _of_each(comparison, "touch.gel", count)
+    touch = comparison.evaluation.touch
+    images, gels = _of_each(touch.image, "touch.image", count), _of_each(touch.gel, "touch.gel", count)
     gates: tuple[Gate | None, ...] = scored.found.last.gates or (None,) * count
     poses, true = object_from_gels(scored.found), true_points(scored)
     return tuple(
@@ -168,11 +170,10 @@ def _error(after: Estimate | FitRefused, true: FloatArray) -> float | None:
     return float(np.linalg.norm(after.position_in_object - true))
 
 
-def _of_each(comparison: Comparison, name: str, count: int) -> list[Any]:
-    """A quantity of every contact, or why it was not simulated."""
-    values = comparison.evaluation.values
-    if name in values:
-        return list(values[name])
+def _of_each(values: AnyArray | None, name: str, count: int) -> list[Any]:
+    """Return a quantity of every contact, or why it was not simulated."""
+    if values is not None:
+        return list(values)
     return [Missing(f"the scene's observe does not ask for {name}")] * count
 
 
@@ -318,9 +319,9 @@ GIVES = ("contact.gel_from_object",)
 """What an answer gives the simulation."""
 
 
-def sources(scored: Scored) -> Mapping[str, Any]:
-    """The answer's part of what the scene's observed quantities are computed from."""
-    return {"contact.gel_from_object": inverse(object_from_gels(scored.found))}
+def sources(scored: Scored) -> Quantities:
+    """Return the answer's part of what the scene's observed quantities are computed from."""
+    return {"contact_gel_from_object": inverse(object_from_gels(scored.found))}
 
 
 def object_from_gels(found: Answer) -> FloatArray:

@@ -15,6 +15,7 @@ from harness.commands.press.touch_answer import Touched, as_json, draw, print_an
 
 if TYPE_CHECKING:
     from harness.bench.scene import SceneFile
+    from harness.effects.quantities import Quantities
     from harness.sim.gel.height_file import Heights
     from harness.sim.optics.pressed_gel import Gel
 
@@ -344,10 +345,10 @@ def _press_mesh(
     place = places.pressed_place(known.mesh, contact, vertex)
     at = gel_from_object(place, depth, tilt, azimuth, yaw, gel.sensor.gel_thickness)
     read = time.perf_counter() - begun
-    sources = {
-        "object.mesh": known.mesh,
-        "contact.gel_from_object": at[None],
-        "contact.presses": Presses.one(place.point, place.normal, depth, tilt, azimuth, yaw),
+    sources: Quantities = {
+        "object_mesh": known.mesh,
+        "contact_gel_from_object": at[None],
+        "contact_presses": Presses.one(place.point, place.normal, depth, tilt, azimuth, yaw),
     }
     press = press_mesh(sources, gel, scene, levels, force)
     asked = {"depth_m": depth, "tilt_rad": tilt, "azimuth_rad": azimuth, "yaw_rad": yaw}

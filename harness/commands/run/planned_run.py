@@ -13,8 +13,8 @@ from harness.commands.options import positive
 from harness.commands.output import ANSWERS, CONSOLE, emit, resumable, step_progress, stopped, warn
 from harness.commands.scenes import SceneOptions, resolve
 from harness.effects.accuracy import Accuracy
+from harness.effects.catalogue import scene_levels
 from harness.effects.explain import as_table, left_out, networks_as_table, networks_in_use, scene_plan
-from harness.effects.file_levels import scene_levels
 from harness.experiment.answer import Publish, WrittenAnswer, add_report, finish, write_answer
 from harness.experiment.begin import Begun, begin
 from harness.experiment.budget import answer_as_asked, sentences

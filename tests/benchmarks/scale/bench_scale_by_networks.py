@@ -22,7 +22,7 @@ from experiments.scale_estimation.size import Belief
 from harness.basics.errors import FitRefused
 from harness.bench.scene import SceneFile, scene_from_options
 from harness.bench.station_file import Station, load_station, station_path
-from harness.effects.sound_effects import SHAPES
+from harness.effects.sound import SHAPES
 from harness.experiment.levels import chosen_levels
 from harness.experiment.lookup import named
 from harness.experiment.plain import perform_in_process

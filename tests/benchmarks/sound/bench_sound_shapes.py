@@ -9,10 +9,8 @@ beside: no level can be nearer than that. Without a folder an ObjectFile is buil
 
 import tempfile
 import time
-from collections.abc import Mapping
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -30,6 +28,7 @@ from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import Facts, knobs_of
 from harness.effects.evaluate import evaluate
 from harness.effects.plan import plan
+from harness.effects.quantities import Quantities
 from harness.effects.scene_object import known_file, known_object
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.objects.household import MATERIALS as MADE_OF
@@ -72,11 +71,12 @@ def _scene(name: str, folder: Path) -> SceneFile:
 def _print(scene: SceneFile, repeat: int) -> None:
     mesh = known_object(scene).mesh
     of = known_file(scene, mesh)
-    sources = {
-        "object.mesh": mesh,
-        "object.wall": None,
-        "object.material": MATERIALS[scene.object.material],
-        "object.file": of,
+    assert of is not None
+    sources: Quantities = {
+        "object_mesh": mesh,
+        "object_wall": None,
+        "object_material": MATERIALS[scene.object.material],
+        "object_file": of,
     }
     found = {level: _taken(scene, sources, level, _READINGS) for level in ("table", "network")}
     seconds, modes = _taken(scene, sources, "elements", repeat - 1)
@@ -96,7 +96,7 @@ def _print(scene: SceneFile, repeat: int) -> None:
 
 
 def _taken(
-    scene: SceneFile, sources: Mapping[str, Any], level: str, times: int, store: Store | None = None
+    scene: SceneFile, sources: Quantities, level: str, times: int, store: Store | None = None
 ) -> tuple[list[float], list[Modes]]:
     chosen = plan(
         EFFECTS,
@@ -107,7 +107,7 @@ def _taken(
     seconds, modes = [], []
     for _ in range(times):
         begun = time.process_time()
-        modes.append(from_arrays(evaluate(chosen, sources, store)["object.modes"]))
+        modes.append(from_arrays(evaluate(chosen, sources, store).values["object_modes"]))
         seconds.append(time.process_time() - begun)
     return seconds, modes
 

@@ -40,7 +40,7 @@ from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station, load_station, station_path
 from harness.effects.accuracy import Knob, Level, Setting
 from harness.effects.scene_object import known_object
-from harness.effects.sound_effects import EDGE, MODES
+from harness.effects.sound import EDGE, MODES
 from harness.experiment.subjects import objects
 from harness.recording.run_folder import station_calibration
 from tests.benchmarks.results import benchmark_parser, finish_figure

@@ -24,8 +24,8 @@ from experiments.contact_localization.posterior.dials import SENSES
 from harness.bench.scene import scene_from_options
 from harness.bench.station_file import load_station, station_path
 from harness.effects.accuracy import Level, Setting
-from harness.effects.sound_effects import SHAPES as SOUND
-from harness.effects.touch_file_effects import SHAPES as TOUCH
+from harness.effects.sound import SHAPES as SOUND
+from harness.effects.touch import SHAPES as TOUCH
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell
 

@@ -25,7 +25,7 @@ from harness.authoring.touch.touch import OFF, spaced_codes
 from harness.basics.arrays import AnyArray, ByteArray, FloatArray
 from harness.basics.materials import material
 from harness.bench.sensor import GELSIGHT_R15
-from harness.effects.touch_drawing import optics
+from harness.effects.touch import prepare_optics
 from harness.objectfile.entries import Provenance
 from harness.objectfile.file import ObjectFile, create_object
 from harness.objectfile.surface_search import SurfaceSearch
@@ -127,7 +127,7 @@ def _nearest(of: ObjectFile, codes: CodeMaps, reference: ObjectTouch, presses: P
 
 
 def _pictures(maps: FloatArray) -> ByteArray:
-    drawn: ByteArray = optics(CALIBRATION, "fast", GELSIGHT_R15).render(maps).images
+    drawn: ByteArray = prepare_optics(CALIBRATION, "fast", GELSIGHT_R15).render(maps).images
     return drawn
 
 

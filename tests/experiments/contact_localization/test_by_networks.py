@@ -15,7 +15,7 @@ from experiments.contact_localization.section import Localization
 from harness.basics.errors import DataRefused
 from harness.bench.scene import scene_from_options
 from harness.bench.station_file import load_station, station_path
-from harness.effects import sound_effects
+from harness.effects import sound as sound_effects
 from harness.effects.accuracy import Accuracy
 from harness.experiment.compare import compare
 from harness.experiment.experiment import Scored
@@ -99,7 +99,7 @@ def test_a_pose_that_no_network_answers_is_drawn_and_said(run: RunFiles, drawn: 
     found, accuracy = answered(run)
     scored = Scored(run, None, found, None, accuracy, ())
     beside = np.eye(4)[None] + 0.0
-    comparison = compare(scored, {"contact.gel_from_object": beside})
+    comparison = compare(scored, {"contact_gel_from_object": beside})
     assert drawn
     (note,) = comparison.notes
     assert "touch.shapes = reference" in note

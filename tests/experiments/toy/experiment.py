@@ -16,6 +16,7 @@ from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy, Knob
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
+from harness.effects.quantities import Quantities
 from harness.experiment.experiment import Experiment, Helpers, Planned, Scored
 from harness.experiment.plain import Answered, plain_budgets, plain_measurement
 from harness.recording.run_folder import RunFiles
@@ -95,11 +96,11 @@ def lines(result: Mapping[str, Any]) -> list[str]:
     return [f"toy: touched at {1e3 * result['height_m']:.0f} mm"]
 
 
-def sources(scored: Scored) -> Mapping[str, Any]:
+def sources(scored: Scored) -> Quantities:
     """Where the gel was."""
     run = scored.run
     gels: Sequence[FloatArray] = scored.answering.poses
-    return {"contact.gel_from_object": inverse(np.array(gels)) @ run.scene.base_from_object(run.mesh)}
+    return {"contact_gel_from_object": inverse(np.array(gels)) @ run.scene.base_from_object(run.mesh)}
 
 
 EXPERIMENT = Experiment(

@@ -10,7 +10,7 @@ import pytest
 
 from harness.basics.errors import DataRefused, WrongUse
 from harness.bench.scene import SceneFile, load_scene, scene_from_json, scene_from_options
-from harness.effects.file_levels import scene_levels
+from harness.effects.catalogue import scene_levels
 from harness.effects.scene_object import known_file, known_object
 from harness.objectfile.file import ObjectFile
 from tests.samples.object_bench import egg_file, rewrite

@@ -13,6 +13,7 @@ from harness.effects.catalogue import EFFECTS
 from harness.effects.evaluate import evaluate
 from harness.effects.explain import scene_plan
 from harness.effects.plan import default_accuracy
+from harness.effects.quantities import Quantities
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import plain
 from harness.sim.light.direct_image import LitObject
@@ -30,8 +31,8 @@ def test_a_scene_camera_sees_what_rays_and_lights_say() -> None:
     look = plain(together(square(0.1), square(0.03, 0.05)), (0.8, 0.5, 0.2))
     camera = Pinhole.looking_at((0.2, 0, 0.3), (0, 0, 0), (0, 0, 1), 20, 16, 0.5)
     lamps = (DirectionalLight(np.array([-0.2, 0.0, 1.0])),)
-    given = {"object.appearance": look, "camera": camera, "camera.lights": lamps}
-    found = evaluate(made, given)["camera.image"]
+    given: Quantities = {"object_appearance": look, "camera": camera, "camera_lights": lamps}
+    found = evaluate(made, given).values["camera_image"]
     wanted = LitObject(look).render(camera, lamps, 4)
     np.testing.assert_array_equal(found.image.colour, wanted.image.colour)
     bare = LitObject(look).render(camera, lamps, 4, shadow=False)
@@ -48,14 +49,14 @@ def test_a_scene_camera_takes_its_picture_from_the_networks(tmp_path: Path) -> N
     made = scene_plan(scene, GELSIGHT_R15, accuracy)
     assert [step.effect.provides for step in made.ran] == ["object.vision", "camera.image"]
     lamps = tuple(DirectionalLight(np.array(way)) for way in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
-    given = {
-        "object.file": of,
-        "object.mesh": of.mesh,
-        "object.wall": None,
+    given: Quantities = {
+        "object_file": of,
+        "object_mesh": of.mesh,
+        "object_wall": None,
         "camera": Pinhole.looking_at((0.2, -0.2, 0.2), (0, 0, 0), (0, 0, 1), 16, 12, 0.5),
     }
     both, one, none = (
-        evaluate(made, given | {"camera.lights": lamps[:k]})["camera.image"] for k in (2, 1, 0)
+        evaluate(made, {**given, "camera_lights": lamps[:k]}).values["camera_image"] for k in (2, 1, 0)
     )
     assert one.image.alpha.max() > 0.99
     np.testing.assert_allclose(both.image.colour, 2.0 * one.image.colour, rtol=1e-5)
@@ -63,7 +64,7 @@ def test_a_scene_camera_takes_its_picture_from_the_networks(tmp_path: Path) -> N
     assert not none.image.colour.any()
     other = Mesh(1.1 * of.mesh.vertices, of.mesh.faces)
     with pytest.raises(WrongUse, match=r"camera\.look = direct"):
-        evaluate(made, given | {"camera.lights": lamps, "object.mesh": other})
+        evaluate(made, {**given, "camera_lights": lamps, "object_mesh": other})
 
 
 def test_a_picture_by_networks_needs_an_objectfile_in_the_scene() -> None:

@@ -1,8 +1,8 @@
 """The catalogue: what a scene calls for runs, by count of kernel calls, and nothing else does."""
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import replace
+from functools import wraps
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,11 @@ from harness.bench.scene import Light, Room, SceneFile, Sensors, scene_from_opti
 from harness.bench.sensor import GELSIGHT_R15, MarkerGrid
 from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
-from harness.effects.effect import Effect, Facts, by_name, knobs_of
+from harness.effects.effect import Effect, Facts, knobs_of
 from harness.effects.evaluate import evaluate
 from harness.effects.explain import as_json, as_table, left_out, scene_plan
 from harness.effects.plan import default_accuracy, plan
+from harness.effects.quantities import Quantities
 from harness.objects.household import build
 from harness.sim.gel.markers import draw_markers
 from harness.sim.optics.shadow import ShadowTable
@@ -47,13 +48,13 @@ def press(mesh: Mesh, depth: float) -> np.ndarray[Any, np.dtype[np.float64]]:
     return inverse(object_from_gel[None])
 
 
-def sources(mug: Mesh, calibration: TactileCalibration, *depths: float) -> dict[str, Any]:
+def sources(mug: Mesh, calibration: TactileCalibration, *depths: float) -> Quantities:
     return {
-        "object.mesh": mug,
-        "contact.gel_from_object": np.concatenate([press(mug, depth) for depth in depths]),
+        "object_mesh": mug,
+        "contact_gel_from_object": np.concatenate([press(mug, depth) for depth in depths]),
         "sensor": GELSIGHT_R15,
-        "sensor.calibration": calibration,
-        "sensor.noise": 1.5,
+        "sensor_calibration": calibration,
+        "sensor_noise": 1.5,
         "seed": 3,
     }
 
@@ -64,9 +65,10 @@ def with_sensors(**on: bool) -> SceneFile:
 
 def counting(count: Counter[str]) -> tuple[Effect, ...]:
     def wrap(effect: Effect) -> Effect:
-        def compute(given: Mapping[str, Any], levels: Mapping[str, Any]) -> Any:
+        @wraps(effect.compute)
+        def compute(**given: Any) -> object:
             count[effect.provides] += 1
-            return effect.compute(given, levels)
+            return effect.compute(**given)
 
         return replace(effect, compute=compute)
 
@@ -107,20 +109,20 @@ def test_a_press_is_seen_where_it_is_and_nothing_elsewhere(
 ) -> None:
     made = scene_plan(SCENE, GELSIGHT_R15)
     done = evaluate(made, sources(mug, calibration, 1e-3, -5e-3, 2e-3))
-    pressed, untouched, _ = done["touch.image"]
-    deepest = done["touch.height_map"].max(axis=(1, 2))
+    pressed, untouched, _ = done.values["touch_image"]
+    deepest = done.values["touch_height_map"].max(axis=(1, 2))
     assert deepest[2] - deepest[0] == pytest.approx(1e-3, abs=1e-12)
     assert deepest[1] == 0.0
     assert np.array_equal(untouched, calibration.background)
     assert np.abs(pressed.astype(int) - calibration.background).max() > 20
-    assert done["touch.image"].dtype == np.uint8
+    assert done.values["touch_image"].dtype == np.uint8
 
 
 def test_a_batch_is_the_contacts_one_by_one(mug: Mesh, calibration: TactileCalibration) -> None:
     made = scene_plan(with_sensors(noise=False), GELSIGHT_R15)
     depths = (0.3e-3, 1e-3, 1.7e-3)
-    whole = evaluate(made, sources(mug, calibration, *depths))["touch.image"]
-    each = [evaluate(made, sources(mug, calibration, depth))["touch.image"][0] for depth in depths]
+    whole = evaluate(made, sources(mug, calibration, *depths)).values["touch_image"]
+    each = [evaluate(made, sources(mug, calibration, depth)).values["touch_image"][0] for depth in depths]
     assert np.array_equal(whole, np.array(each))
 
 
@@ -142,8 +144,8 @@ def test_an_estimated_contact_is_held_at_the_gel_s_thickness(
 ) -> None:
     """Presses that a user requests are refused: ``tests/harness/commands/press`` and ``test_api``."""
     done = evaluate(scene_plan(SCENE, GELSIGHT_R15), sources(mug, calibration, 1e-3, 4e-3))
-    assert done["touch.height_map"][1].max() > GELSIGHT_R15.gel_thickness
-    assert done["touch.gel"].max() <= GELSIGHT_R15.gel_thickness
+    assert done.values["touch_height_map"][1].max() > GELSIGHT_R15.gel_thickness
+    assert done.values["touch_gel"].max() <= GELSIGHT_R15.gel_thickness
 
 
 def test_noise_runs_only_where_it_is_asked_for(mug: Mesh, calibration: TactileCalibration) -> None:
@@ -153,11 +155,11 @@ def test_noise_runs_only_where_it_is_asked_for(mug: Mesh, calibration: TactileCa
     clean = evaluate(scene_plan(SCENE, GELSIGHT_R15), sources(mug, calibration, 1e-3, 1e-3))
     assert noisy.calls["touch.noise"] == 1
     assert "touch.noise" not in clean.calls
-    added = noisy["touch.noise"] - clean["touch.image"]
+    added = noisy.values["touch_noise"] - clean.values["touch_image"]
     assert added.std() == pytest.approx(1.5, rel=0.01)
     assert not np.array_equal(added[0], added[1])
     again = evaluate(scene_plan(with_sensors(noise=True), GELSIGHT_R15), sources(mug, calibration, 1e-3))
-    assert np.array_equal(again["touch.image"][0], noisy["touch.image"][0])
+    assert np.array_equal(again.values["touch_image"][0], noisy.values["touch_image"][0])
 
 
 def test_in_the_open_no_room_is_computed_and_in_a_room_it_is_planned() -> None:
@@ -179,7 +181,7 @@ def test_markers_run_only_where_the_gel_has_them(mug: Mesh, calibration: Tactile
         count: Counter[str] = Counter()
         effects = counting(count)
         made = plan(effects, Facts(SCENE, sensor), ["touch.image"], default_accuracy(effects))
-        evaluate(made, sources(mug, calibration, 1e-3) | {"sensor": sensor})
+        evaluate(made, {**sources(mug, calibration, 1e-3), "sensor": sensor})
         assert (count["touch.marker_motion"], count["touch.markers"]) == (times, times)
         assert count == {step.effect.provides: 1 for step in made.ran}
     scene = SCENE.model_copy(update={"observe": ("touch.marker_motion",)})
@@ -188,37 +190,37 @@ def test_markers_run_only_where_the_gel_has_them(mug: Mesh, calibration: Tactile
 
 
 def test_untouched_dots_are_at_rest_and_pressed_ones_move(mug: Mesh, calibration: TactileCalibration) -> None:
-    given = sources(mug, calibration, -5e-3, 1e-3) | {"sensor": DOTTED}
+    given: Quantities = {**sources(mug, calibration, -5e-3, 1e-3), "sensor": DOTTED}
     done = evaluate(scene_plan(SCENE, DOTTED), given)
     bare = evaluate(scene_plan(SCENE, GELSIGHT_R15), sources(mug, calibration, -5e-3, 1e-3))
     at_rest = draw_markers(calibration.background[None], np.zeros((1, 63, 2)), DOTTED)
-    assert np.array_equal(done["touch.image"][0], at_rest[0])
-    assert not done["touch.marker_motion"][0].any()
-    assert np.abs(done["touch.marker_motion"][1]).max() > 2e-5
-    same = (done["touch.image"] == bare["touch.image"]).all(axis=-1).mean(axis=(1, 2))
+    assert np.array_equal(done.values["touch_image"][0], at_rest[0])
+    assert not done.values["touch_marker_motion"][0].any()
+    assert np.abs(done.values["touch_marker_motion"][1]).max() > 2e-5
+    same = (done.values["touch_image"] == bare.values["touch_image"]).all(axis=-1).mean(axis=(1, 2))
     assert ((same > 0.8) & (same < 0.95)).all()  # 63 dots of 0.4 mm are a tenth of the window
 
 
 def test_a_sensor_that_casts_shadows_needs_its_table(mug: Mesh, calibration: TactileCalibration) -> None:
     with pytest.raises(WrongUse, match=r"sensor\.shadow_table"):
-        evaluate(scene_plan(SCENE, GRAZED), sources(mug, calibration, 1e-3) | {"sensor": GRAZED})
+        evaluate(scene_plan(SCENE, GRAZED), {**sources(mug, calibration, 1e-3), "sensor": GRAZED})
 
 
 def test_shadows_only_darken_around_what_touches(mug: Mesh, calibration: TactileCalibration) -> None:
     scene = SCENE.model_copy(update={"observe": ("touch.image", "touch.shadow_out_of_table")})
     made = scene_plan(scene, GRAZED)
     depths = (-5e-3, 1e-3)
-    given = sources(mug, calibration, *depths) | {"sensor": GRAZED}
-    done = evaluate(made, given | {"sensor.shadow_table": shadow_table(-60.0)})
-    bare = evaluate(scene_plan(SCENE, GELSIGHT_R15), sources(mug, calibration, *depths))["touch.image"]
-    assert np.array_equal(done["touch.colour"], bare)
-    assert np.array_equal(done["touch.image"][0], calibration.background)
-    assert (done["touch.image"] <= bare).all()
-    assert (done["touch.image"][1] < bare[1]).sum() > 500
-    assert done["touch.shadow_out_of_table"].shape == (2,)
+    given: Quantities = {**sources(mug, calibration, *depths), "sensor": GRAZED}
+    done = evaluate(made, {**given, "sensor_shadow_table": shadow_table(-60.0)})
+    bare = evaluate(scene_plan(SCENE, GELSIGHT_R15), sources(mug, calibration, *depths)).values["touch_image"]
+    assert np.array_equal(done.values["touch_colour"], bare)
+    assert np.array_equal(done.values["touch_image"][0], calibration.background)
+    assert (done.values["touch_image"] <= bare).all()
+    assert (done.values["touch_image"][1] < bare[1]).sum() > 500
+    assert done.values["touch_shadow_out_of_table"].shape == (2,)
     assert done.calls == {step.effect.provides: 1 for step in made.ran}
-    light = evaluate(made, given | {"sensor.shadow_table": shadow_table(1e3)})
-    assert np.array_equal(light["touch.image"], bare)
+    light = evaluate(made, {**given, "sensor_shadow_table": shadow_table(1e3)})
+    assert np.array_equal(light.values["touch_image"], bare)
 
 
 def test_lights_call_for_shadows_of_the_scene_camera() -> None:
@@ -236,8 +238,7 @@ def test_without_touch_a_tactile_image_is_refused() -> None:
         scene_plan(with_sensors(touch=False), GELSIGHT_R15)
 
 
-def test_names_and_knobs_are_unique() -> None:
-    assert len(by_name(EFFECTS)) == len(EFFECTS)
+def test_knobs_are_unique() -> None:
     chosen = [effect.choice for effect in EFFECTS if effect.choice is not None]
     knobs = [*chosen, *(knob for effect in EFFECTS for knob in effect.knobs)]
     assert len({knob.name for knob in knobs}) == len(knobs) == len(knobs_of(EFFECTS))

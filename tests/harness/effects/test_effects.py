@@ -1,7 +1,7 @@
 """Effects on demand: the plan says what runs and why, and exactly the plan runs, once."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,10 @@ from harness.basics.store import Store
 from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
 from harness.effects.accuracy import Accuracy, Knob, Level
-from harness.effects.effect import Condition, Effect, Facts, Implementation, by_name, knobs_of
+from harness.effects.effect import Condition, Effect, Facts, Implementation, build_catalogue, knobs_of
 from harness.effects.evaluate import Evaluation, evaluate
-from harness.effects.plan import default_accuracy, plan
+from harness.effects.plan import Plan, default_accuracy, plan
+from harness.effects.quantities import Quantities
 
 FACTS = Facts(scene_from_options("builtin:mug"), GELSIGHT_R15)
 NEVER = Condition(lambda _: False, "it is so", "it is not so")
@@ -26,21 +27,35 @@ ALWAYS = Condition(lambda _: True, "it is so", "it is not so")
 FACTOR = Knob("b", (1, 2, 3), "", "number", 2)
 
 
+class Toy(Quantities, total=False):
+    """Quantities of these tests."""
+
+    x: Any
+    y: Any
+    a: Any
+    b: Any
+    c: Any
+    d: Any
+
+
 def chain(compute: Callable[[str, Any], Any], when: Condition | None = None) -> tuple[Effect, ...]:
     """``a`` of the source ``x``; ``b`` of ``a``; ``c`` of ``b``; and ``d`` of ``x``, which nobody needs."""
 
-    def effect(name: str, *needs: str, **more: Any) -> Effect:
-        def run(given: Mapping[str, Any], levels: Mapping[str, Any]) -> Any:
-            assert set(given) == set(needs)
-            return compute(name, given[needs[0]] * levels.get("b", 1))
+    def of_x(x: Any) -> Any:
+        return compute("a", x)
 
-        return Effect(name, needs, run, **more)
+    def of_a(a: Any, *, b: int) -> Any:
+        return compute("b", a * b)
 
-    return (
-        effect("a", "x"),
-        effect("b", "a", when=when, bypass="a", knobs=(FACTOR,)),
-        effect("c", "b"),
-        effect("d", "x"),
+    def of_b(b: Any) -> Any:
+        return compute("c", b)
+
+    return build_catalogue(
+        Effect("a", of_x),
+        Effect("b", of_a, when=when, bypass="a", knobs=(FACTOR,)),
+        Effect("c", of_b),
+        Effect("d", of_x),
+        quantities=Toy,
     )
 
 
@@ -49,7 +64,15 @@ def add_one(_name: str, value: Any) -> Any:
 
 
 def run(effects: tuple[Effect, ...], *wanted: str, x: Any = 1.0, store: Store | None = None) -> Evaluation:
-    return evaluate(plan(effects, FACTS, wanted, default_accuracy(effects)), {"x": x}, store)
+    return evaluated(plan(effects, FACTS, wanted, default_accuracy(effects)), x, store)
+
+
+def evaluated(made: Plan, x: Any, store: Store | None = None) -> Evaluation:
+    return evaluate(made, Toy(x=x), store)
+
+
+def value(done: Evaluation, name: str) -> Any:
+    return done[name]
 
 
 def test_only_what_is_wanted_is_planned_with_everything_it_needs() -> None:
@@ -81,7 +104,7 @@ def test_exactly_the_plan_runs_and_each_effect_once() -> None:
 def test_a_bypassed_effect_is_passed_through_and_says_so() -> None:
     effects = chain(add_one, NEVER)
     made = plan(effects, FACTS, ["c"], default_accuracy(effects))
-    done = evaluate(made, {"x": 1.0})
+    done = evaluated(made, 1.0)
     assert dict(done.calls) == {"a": 1, "c": 1}
     assert done["b"] is done["a"]
     assert done["c"] == 3.0
@@ -103,7 +126,7 @@ def test_an_effect_the_scene_rules_out_gives_that_reason_even_if_nobody_asked() 
 
 
 def test_asking_for_what_the_scene_rules_out_is_refused() -> None:
-    effects = (Effect("a", ("x",), lambda g, _: g["x"], when=NEVER), Effect("b", ("a",), lambda g, _: g["a"]))
+    effects = (Effect("a", lambda x: x, when=NEVER), Effect("b", lambda a: a))
     with pytest.raises(WrongUse, match=r"^a .*it is not so"):
         run(effects, "a")
     with pytest.raises(WrongUse, match=r"b .*a, .*it is not so"):
@@ -111,7 +134,7 @@ def test_asking_for_what_the_scene_rules_out_is_refused() -> None:
 
 
 def test_asking_for_what_nothing_computes_names_the_nearest() -> None:
-    effects = (Effect("touch.image", ("x",), lambda g, _: g["x"]),)
+    effects = (Effect("touch.image", lambda x: x),)
     with pytest.raises(WrongUse, match=r"'touch.imgae'.*'touch.image'"):
         run(effects, "touch.imgae")
 
@@ -127,20 +150,20 @@ def test_a_missing_source_is_named_before_anything_is_computed() -> None:
 
 def test_a_circle_is_refused_and_spelled_out() -> None:
     effects = (
-        Effect("a", ("b",), lambda g, _: g["b"]),
-        Effect("b", ("c",), lambda g, _: g["c"]),
-        Effect("c", ("b",), lambda g, _: g["b"]),
+        Effect("a", lambda b: b),
+        Effect("b", lambda c: c),
+        Effect("c", lambda b: b),
     )
     with pytest.raises(ValueError, match=r"b .*c .*b"):
         run(effects, "a")
 
 
 def test_two_homes_for_a_quantity_and_a_foreign_bypass_are_refused() -> None:
-    one = Effect("a", ("x",), lambda g, _: g["x"])
+    one = Effect("a", lambda x: x)
     with pytest.raises(ValueError, match=r"two .*\ba\b"):
-        run((one, one), "a")
+        build_catalogue(one, one)
     with pytest.raises(ValueError, match=r"\by\b"):
-        run((replace(one, bypass="y"),), "a")
+        build_catalogue(replace(one, bypass="y"))
 
 
 @dataclass(frozen=True)
@@ -151,24 +174,24 @@ class Pair:
 def test_arrays_that_leave_an_effect_cannot_be_written_and_sources_stay_writable() -> None:
     source = np.ones(3)
     effects = (
-        Effect("a", ("x",), lambda g, _: g["x"]),
-        Effect("b", ("x",), lambda g, _: (g["x"] + 1, {"k": g["x"] + 2})),
-        Effect("c", ("x",), lambda g, _: Pair(g["x"] + 3)),
+        Effect("a", lambda x: x),
+        Effect("b", lambda x: (x + 1, {"k": x + 2})),
+        Effect("c", lambda x: Pair(x + 3)),
     )
     done = run(effects, "a", "b", "c", x=source)
-    for array in (done["a"], done["b"][0], done["b"][1]["k"], done["c"].array):
+    for array in (value(done, "a"), value(done, "b")[0], value(done, "b")[1]["k"], value(done, "c").array):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 5.0
     with pytest.raises(TypeError):
-        done.values["a"] = 1  # type: ignore[index]
+        done.values["seed"] = 1
     source[0] = 7.0
     assert source[0] == 7.0
 
 
 def test_the_leading_batch_axis_is_carried_through() -> None:
     batch = np.arange(12.0).reshape(4, 3)
-    whole = run(chain(add_one), "c", x=batch)["c"]
-    each = [run(chain(add_one), "c", x=batch[i : i + 1])["c"][0] for i in range(4)]
+    whole = value(run(chain(add_one), "c", x=batch), "c")
+    each = [value(run(chain(add_one), "c", x=batch[i : i + 1]), "c")[0] for i in range(4)]
     assert np.array_equal(whole, np.array(each))
 
 
@@ -186,9 +209,9 @@ def test_a_store_changes_no_result(
     made = plan(effects, FACTS, ["c"], accuracy)
     x = np.linspace(0.0, 1.0, 5)
     store = Store(tmp_path_factory.mktemp("store"))
-    without = evaluate(made, {"x": x})
+    without = evaluated(made, x)
     for _ in range(3):
-        assert np.array_equal(evaluate(made, {"x": x}, store)["c"], without["c"])
+        assert np.array_equal(value(evaluated(made, x, store), "c"), value(without, "c"))
 
 
 def test_a_stored_result_is_read_and_what_only_it_needed_is_not_computed(tmp_path: Path) -> None:
@@ -199,14 +222,14 @@ def test_a_stored_result_is_read_and_what_only_it_needed_is_not_computed(tmp_pat
     assert (dict(first.calls), first.from_store) == ({"a": 1, "b": 1, "c": 1}, ())
     assert (dict(second.calls), second.from_store) == ({"c": 1}, ("b",))
     with pytest.raises(ValueError, match="read-only"):
-        second["b"][0] = 1.0
+        value(second, "b")[0] = 1.0
 
 
 @pytest.mark.parametrize("change", ["source", "level", "version", "version before", "bypass"])
 def test_whatever_a_result_depends_on_is_in_its_key(tmp_path: Path, change: str) -> None:
     effects = stored(chain(add_one), "c")
     store, x, level = Store(tmp_path), np.ones(2), 2
-    evaluate(plan(effects, FACTS, ["c"], Accuracy(knobs_of(effects), {"b": level})), {"x": x}, store)
+    evaluated(plan(effects, FACTS, ["c"], Accuracy(knobs_of(effects), {"b": level})), x, store)
     if change == "source":
         x = np.nextafter(x, 2.0)
     elif change == "level":
@@ -217,7 +240,7 @@ def test_whatever_a_result_depends_on_is_in_its_key(tmp_path: Path, change: str)
         effects = (replace(effects[0], version=2), *effects[1:])
     else:
         effects = (effects[0], replace(effects[1], when=NEVER), *effects[2:])
-    again = evaluate(plan(effects, FACTS, ["c"], Accuracy(knobs_of(effects), {"b": level})), {"x": x}, store)
+    again = evaluated(plan(effects, FACTS, ["c"], Accuracy(knobs_of(effects), {"b": level})), x, store)
     assert again.calls["c"] == 1
 
 
@@ -226,7 +249,7 @@ def test_a_knob_downstream_does_not_disturb_what_is_stored_upstream(tmp_path: Pa
     store, x = Store(tmp_path), np.ones(2)
     for level in (1, 2, 3):
         made = plan(effects, FACTS, ["c"], Accuracy(knobs_of(effects), {"b": level}))
-        done = evaluate(made, {"x": x}, store)
+        done = evaluated(made, x, store)
         assert ("a" in done.calls) == (level == 1)
 
 
@@ -236,25 +259,23 @@ HOW = Knob("how", ("guess", "table", "exact"), "", "method", "exact")
 def with_ways(guess: Condition | None = ALWAYS, version: int = 1) -> tuple[Effect, ...]:
     """``a`` of ``x``; or guessed, of ``y``; or out of a table, of both; and ``b`` of ``a``."""
     ways: dict[Level, Implementation] = {
-        "guess": Implementation(("y",), lambda g, _: -g["y"], when=guess),
-        "table": Implementation(
-            ("x", "y"), lambda g, levels: g["x"] * levels["b"], knobs=(FACTOR,), version=version
-        ),
+        "guess": Implementation(lambda y: -y, when=guess),
+        "table": Implementation(lambda x, y, *, b: x * b, knobs=(FACTOR,), version=version),
     }
     return (
-        Effect("a", ("x",), lambda g, _: g["x"], choice=HOW, ways=ways),
-        Effect("b", ("a",), lambda g, _: 2.0 * g["a"], stored=True),
+        Effect("a", lambda x: x, choice=HOW, ways=ways),
+        Effect("b", lambda a: 2.0 * a, stored=True),
     )
 
 
 def through(effects: tuple[Effect, ...], how: str, store: Store | None = None, b: int = 2) -> Evaluation:
     made = plan(effects, FACTS, ["b"], Accuracy((HOW, FACTOR), {"how": how, "b": b}))
-    return evaluate(made, {"x": np.ones(2), "y": np.full(2, 5.0)}, store)
+    return evaluate(made, Toy(x=np.ones(2), y=np.full(2, 5.0)), store)
 
 
 def test_a_level_is_a_way_with_needs_and_knobs_of_its_own() -> None:
     effects = with_ways()
-    assert {how: through(effects, str(how))["b"][0] for how in HOW.levels} == {
+    assert {how: value(through(effects, str(how)), "b")[0] for how in HOW.levels} == {
         "guess": -10.0,
         "table": 4.0,
         "exact": 2.0,
@@ -274,8 +295,8 @@ def test_a_way_whose_scene_has_not_what_it_takes_is_refused_only_where_it_would_
     effects = with_ways(NEVER)
     with pytest.raises(WrongUse, match=r"how = guess: it is not so.*how = exact"):
         through(effects, "guess")
-    assert through(effects, "table")["b"][0] == 4.0
-    other = Effect("c", ("x",), lambda g, _: g["x"])
+    assert value(through(effects, "table"), "b")[0] == 4.0
+    other = Effect("c", lambda x: x)
     guessed = Accuracy(knobs_of(effects), {"how": "guess"})
     assert plan((*effects, other), FACTS, ["c"], guessed).sources == ("x",)
 
@@ -291,6 +312,6 @@ def test_ways_are_told_apart_in_the_store_and_a_new_one_drops_nothing(tmp_path: 
 
 
 def test_a_way_of_no_level_is_refused() -> None:
-    astray = replace(with_ways()[0], ways={"gues": Implementation((), lambda _g, _l: 0.0)})
+    astray = replace(with_ways()[0], ways={"gues": Implementation(lambda: 0.0)})
     with pytest.raises(ValueError, match=r"\ba\b.*\("):
-        by_name((astray,))
+        build_catalogue(astray)

@@ -9,9 +9,8 @@ from harness.basics.errors import WrongUse
 from harness.bench.scene import SceneFile, scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
 from harness.cli import invoke
-from harness.effects.catalogue import EFFECTS
+from harness.effects.catalogue import EFFECTS, scene_levels
 from harness.effects.explain import NetworkInUse, networks_in_use, scene_plan
-from harness.effects.file_levels import scene_levels
 from harness.effects.plan import default_accuracy
 from harness.objectfile.audio.part import with_audio
 from harness.objectfile.file import ObjectFile

@@ -18,6 +18,7 @@ from harness.effects.effect import Facts, knobs_of
 from harness.effects.evaluate import Evaluation, evaluate
 from harness.effects.explain import as_json, scene_plan
 from harness.effects.plan import default_accuracy, plan
+from harness.effects.quantities import Quantities
 from harness.objects.solid import from_manifold
 from harness.sim.modal.modal import from_arrays
 from harness.sim.sound.modal_sound import Strikes
@@ -32,7 +33,7 @@ RATE = 50e3
 
 
 @pytest.fixture(scope="module")
-def sources() -> dict[str, Any]:
+def sources() -> Quantities:
     """A ball of plastic struck twice, the second time twice as hard."""
     solid = from_manifold(Manifold.sphere(30.0, 32))
     force = np.zeros((2, 2000))
@@ -40,9 +41,9 @@ def sources() -> dict[str, Any]:
     force[:, : len(pulse)] = pulse * np.array([[1.0], [2.0]])
     points = np.repeat([[0.0, 0.0, 0.03]], 2, axis=0)
     return {
-        "object.mesh": Mesh(solid.vertices * 1e-3, solid.faces),
-        "object.material": MATERIALS["plastic"],
-        "object.wall": None,
+        "object_mesh": Mesh(solid.vertices * 1e-3, solid.faces),
+        "object_material": MATERIALS["plastic"],
+        "object_wall": None,
         "strike": Strikes(points, np.repeat([[0.0, 0.6, -0.8]], 2, axis=0), force, RATE),
         "room": RoomField(0.4, 3.0, 5),
         "microphone": MicrophoneResponse(),
@@ -54,7 +55,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     return Store(tmp_path_factory.mktemp("store"))
 
 
-def heard(scene: SceneFile, sources: dict[str, Any], store: Store | None, **levels: Any) -> Evaluation:
+def heard(scene: SceneFile, sources: Quantities, store: Store | None, **levels: Any) -> Evaluation:
     accuracy = Accuracy(knobs_of(EFFECTS), {name.replace("_", "."): level for name, level in levels.items()})
     chosen = plan(EFFECTS, Facts(scene, GELSIGHT_R15), ["microphone.pressure"], accuracy)
     return evaluate(chosen, sources, store)
@@ -69,11 +70,11 @@ def test_a_touch_only_scene_plans_no_sound_and_says_why() -> None:
         plan(EFFECTS, Facts(SILENT, GELSIGHT_R15), ["microphone.pressure"], default_accuracy(EFFECTS))
 
 
-def test_in_the_open_no_room_is_computed(sources: dict[str, Any], store: Store) -> None:
+def test_in_the_open_no_room_is_computed(sources: Quantities, store: Store) -> None:
     open_field = heard(HEARD, sources, store)
     assert set(open_field.calls) | set(open_field.from_store) >= {"object.modes", "object.sound"}
     assert "room.reverberation" not in open_field.calls
-    pressure = open_field["microphone.pressure"]
+    pressure = open_field.values["microphone_pressure"]
     assert pressure.shape == (2, 2000)
     assert np.isfinite(pressure).all()
     assert pressure[1] == pytest.approx(2.0 * pressure[0], rel=1e-9, abs=1e-12)
@@ -81,14 +82,14 @@ def test_in_the_open_no_room_is_computed(sources: dict[str, Any], store: Store) 
     in_a_room = heard(IN_A_ROOM, sources, store)
     assert in_a_room.calls["room.reverberation"] == 1
     late = slice(500, None)
-    assert np.std(in_a_room["microphone.pressure"][0, late] - pressure[0, late]) > 0.0
+    assert np.std(in_a_room.values["microphone_pressure"][0, late] - pressure[0, late]) > 0.0
 
 
-def test_modes_come_from_the_store_the_second_time(sources: dict[str, Any], store: Store) -> None:
+def test_modes_come_from_the_store_the_second_time(sources: Quantities, store: Store) -> None:
     heard(HEARD, sources, store)
     again = heard(HEARD, sources, store)
     assert "object.modes" in again.from_store
     assert "object.modes" not in again.calls
-    modes = from_arrays(again["object.modes"])
+    modes = from_arrays(again.values["object_modes"])
     assert modes.rigid == 6
     assert modes.frequencies[0] > 1000.0

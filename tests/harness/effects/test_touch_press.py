@@ -13,6 +13,7 @@ from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15, MarkerGrid, described_sensor
 from harness.effects.evaluate import evaluate
 from harness.effects.explain import scene_plan
+from harness.effects.quantities import Quantities
 from harness.effects.touch_press import press_heights, press_mesh
 from harness.objects.household import build
 from harness.sim.gel.gel import deform
@@ -34,30 +35,30 @@ def bump(deepest: float, at: tuple[float, float] = (60.0, 80.0)) -> FloatArray:
     return np.asarray(deepest * np.maximum(0.0, 1.0 - (x * x + y * y) / 500.0))
 
 
-def mug_press(depth: float) -> dict[str, Any]:
+def mug_press(depth: float) -> Quantities:
     """The gel pressed from outside on the wall, opposite the handle."""
     mug = build("mug")
     rotation = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     at = transform(rotation, np.array([mug.bounds[0, 0] + depth, 0.0, 0.05]))
-    return {"object.mesh": mug, "contact.gel_from_object": inverse(at[None])}
+    return {"object_mesh": mug, "contact_gel_from_object": inverse(at[None])}
 
 
 @pytest.fixture(scope="module")
-def pressed_mug() -> dict[str, Any]:
+def pressed_mug() -> Quantities:
     return mug_press(0.8e-3)
 
 
-def test_a_mesh_is_drawn_as_the_catalogue_draws_it(pressed_mug: dict[str, Any]) -> None:
-    given = {**pressed_mug, "sensor": BENCH.sensor, "sensor.calibration": BENCH.calibration}
+def test_a_mesh_is_drawn_as_the_catalogue_draws_it(pressed_mug: Quantities) -> None:
+    given: Quantities = {**pressed_mug, "sensor": BENCH.sensor, "sensor_calibration": BENCH.calibration}
     directly = evaluate(scene_plan(SCENE, GELSIGHT_R15), given)
     press = press_mesh(pressed_mug, BENCH, SCENE)
-    assert np.array_equal(press.image, directly["touch.image"][0])
-    assert np.array_equal(press.heights, directly["touch.height_map"][0])
-    assert press.deepest == directly["touch.height_map"].max()
+    assert np.array_equal(press.image, directly.values["touch_image"][0])
+    assert np.array_equal(press.heights, directly.values["touch_height_map"][0])
+    assert press.deepest == directly.values["touch_height_map"].max()
     assert 0.0 < press.deepest < press.gel.sensor.gel_thickness
 
 
-def test_the_height_map_of_a_mesh_is_drawn_as_the_mesh(pressed_mug: dict[str, Any]) -> None:
+def test_the_height_map_of_a_mesh_is_drawn_as_the_mesh(pressed_mug: Quantities) -> None:
     press = press_mesh(pressed_mug, BENCH, SCENE)
     again = press_heights(press.heights, "object", BENCH, SCENE)
     assert np.array_equal(again.image, press.image)
@@ -65,7 +66,7 @@ def test_the_height_map_of_a_mesh_is_drawn_as_the_mesh(pressed_mug: dict[str, An
     assert np.array_equal(given_gel.image, press.image)
 
 
-def test_only_what_the_sensor_calls_for_is_computed(pressed_mug: dict[str, Any]) -> None:
+def test_only_what_the_sensor_calls_for_is_computed(pressed_mug: Quantities) -> None:
     ran = {step.effect.provides for step in press_mesh(pressed_mug, BENCH, SCENE).plan.ran}
     own = {"touch.drawn", "touch.colour", "touch.saturated", "touch.extrapolated", "touch.image"}
     assert ran == {"object.raster", "touch.height_map", "touch.gel"} | own
@@ -121,7 +122,7 @@ def test_shadows_over_a_measured_dome_fall_downhill_of_the_dome_too() -> None:
     for lean, lower in ((40e-3, slice(0, 80)), (-40e-3, slice(80, 160))):
         slope = np.repeat(np.linspace(0.0, lean, 160)[None], 120, axis=0)
         tipped = press_heights(bump(1e-3), "object", replace(grazed, rest=slope), SCENE)
-        dark = tipped.evaluation["touch.darkening"][0][0].sum(axis=-1) > 1.0
+        dark = tipped.evaluation.values["touch_darkening"][0][0].sum(axis=-1) > 1.0
         assert dark[:, lower].sum() > 0.55 * dark.sum() > 300
 
 
@@ -142,7 +143,7 @@ def test_a_part_that_is_where_the_sensor_would_be_is_refused() -> None:
     inwards = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     # The gel is at the axis, the wall before it is behind its face.
     at = transform(inwards, np.array([0.0, 0.0, 0.05]))
-    given = {"object.mesh": mug, "contact.gel_from_object": inverse(at[None])}
+    given: Quantities = {"object_mesh": mug, "contact_gel_from_object": inverse(at[None])}
     with pytest.raises(OutOfDomain, match=r" mm.*2\.5 mm"):
         press_mesh(given, BENCH, SCENE)
 

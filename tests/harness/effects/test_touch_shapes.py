@@ -21,6 +21,7 @@ from harness.effects.effect import Facts, knobs_of
 from harness.effects.evaluate import Evaluation, evaluate
 from harness.effects.explain import as_json, scene_plan
 from harness.effects.plan import plan
+from harness.effects.quantities import Quantities
 from harness.objectfile.file import ObjectFile, create_object
 from harness.objectfile.touch.touch import open_touch
 from harness.sim.gel.gel import R15_SKIRT
@@ -51,23 +52,24 @@ def presses() -> Presses:
     )
 
 
-def evaluated(of: ObjectFile | None, level: str, **given: Any) -> Evaluation:
+def evaluated(of: ObjectFile | None, level: str, given: Quantities | None = None) -> Evaluation:
     accuracy = Accuracy(knobs_of(EFFECTS), {"touch.shapes": level})
     made = plan(EFFECTS, Facts(scene_of(of), tb.SENSOR), ["touch.gel"], accuracy)
-    sources = {
-        "object.mesh": tb.peg(),
-        "object.wall": None,
-        "object.file": of,
-        "contact.gel_from_object": inverse(presses().object_from_gel),
+    sources: Quantities = {
+        "object_mesh": tb.peg(),
+        "object_wall": None,
+        "contact_gel_from_object": inverse(presses().object_from_gel),
         "sensor": tb.SENSOR,
-        "sensor.calibration": CALIBRATION,
+        "sensor_calibration": CALIBRATION,
     }
-    return evaluate(made, {**sources, **{name.replace("__", "."): value for name, value in given.items()}})
+    if of is not None:
+        sources["object_file"] = of
+    return evaluate(made, {**sources, **(given or {})})
 
 
 def test_codes_are_a_level_of_what_the_rasteriser_computes(of: ObjectFile) -> None:
     codes, reference = evaluated(of, "network"), evaluated(of, "reference")
-    assert np.sqrt(((codes["touch.gel"] - reference["touch.gel"]) ** 2).mean()) < 5e-5
+    assert np.sqrt(((codes.values["touch_gel"] - reference.values["touch_gel"]) ** 2).mean()) < 5e-5
     assert set(codes.calls) == {"contact.presses", "object.touch_codes", "touch.gel"}
     assert set(reference.calls) == {"object.raster", "touch.height_map", "touch.gel"}
 
@@ -75,7 +77,7 @@ def test_codes_are_a_level_of_what_the_rasteriser_computes(of: ObjectFile) -> No
 def test_a_pose_is_answered_as_the_press_that_it_is(of: ObjectFile) -> None:
     """To float32's rounding of a millimetre."""
     np.testing.assert_allclose(
-        evaluated(of, "network")["touch.gel"], open_touch(of, "codes").at(presses()), atol=1e-8
+        evaluated(of, "network").values["touch_gel"], open_touch(of, "codes").at(presses()), atol=1e-8
     )
 
 
@@ -121,7 +123,7 @@ def test_an_objectfile_without_touch_is_refused(tmp_path: Path) -> None:
 )
 def test_another_object_is_refused_and_said(of: ObjectFile, mesh: Mesh, said: str) -> None:
     with pytest.raises(WrongUse, match=f"{said}.*touch.shapes = reference"):
-        evaluated(of, "network", object__mesh=mesh)
+        evaluated(of, "network", {"object_mesh": mesh})
 
 
 @pytest.mark.parametrize(
@@ -138,13 +140,13 @@ def test_another_object_is_refused_and_said(of: ObjectFile, mesh: Mesh, said: st
 def test_another_gel_is_refused_and_said(of: ObjectFile, sensor: Any, skirt: Any, said: str) -> None:
     calibration = replace(BENCH, header=replace(BENCH.header, skirt=skirt))
     with pytest.raises(WrongUse, match=f"{said}.*touch.shapes = reference"):
-        evaluated(of, "network", sensor=sensor, sensor__calibration=calibration)
+        evaluated(of, "network", {"sensor": sensor, "sensor_calibration": calibration})
 
 
 def test_a_pose_that_the_codes_were_not_made_for_is_refused(of: ObjectFile) -> None:
     deep = replace(presses(), depths=np.full(6, 2.6e-3))
     with pytest.raises(OutOfDomain, match=r"2\.6 mm.* 0 to 2\.5 mm"):
-        evaluated(of, "network", contact__gel_from_object=inverse(deep.object_from_gel))
+        evaluated(of, "network", {"contact_gel_from_object": inverse(deep.object_from_gel)})
 
 
 @pytest.mark.parametrize(
@@ -180,9 +182,9 @@ mesh = ObjectFile.open(Path(sys.argv[1])).mesh
 at = gel_from_object(contact_place(mesh, np.array([0.01, 0.02, 0.05])), 1e-3, 0.0, 0.0, 0.0)
 scene = scene_from_options("builtin:mug", objectfile=sys.argv[1])
 gel = Gel(GELSIGHT_R15, shipped_calibration("gelsight_r15_bench"))
-press_mesh({"object.mesh": mesh, "contact.gel_from_object": at[None]}, gel, scene)
+press_mesh({"object_mesh": mesh, "contact_gel_from_object": at[None]}, gel, scene)
 print(sorted(TOUCH & sys.modules.keys()))
-press_mesh({"object.mesh": mesh, "contact.gel_from_object": at[None]}, gel, scene, ["touch.shapes=network"])
+press_mesh({"object_mesh": mesh, "contact_gel_from_object": at[None]}, gel, scene, ["touch.shapes=network"])
 print("harness.objectfile.touch.touch" in sys.modules)
 """
 

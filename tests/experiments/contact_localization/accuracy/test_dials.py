@@ -22,7 +22,7 @@ from experiments.contact_localization.posterior.dials import (
 )
 from harness.basics.errors import WrongUse
 from harness.effects.accuracy import Accuracy, Knob, Level
-from harness.effects.sound_effects import EDGE
+from harness.effects.sound import EDGE
 from harness.experiment.front import front_of
 from tests.support.localization import chosen, dials
 

@@ -23,10 +23,10 @@ from harness.bench.scene import SceneFile, Sensors, scene_from_options
 from harness.bench.station_file import load_station, station_path
 from harness.commands.scenes import SceneOptions, resolve
 from harness.cost.curve import Point, Sample
-from harness.effects import sound_effects
+from harness.effects import sound as sound_effects
 from harness.effects.accuracy import Accuracy, Level
 from harness.effects.scene_object import known_object
-from harness.effects.touch_file_effects import SHAPES as TOUCH
+from harness.effects.touch import SHAPES as TOUCH
 from harness.experiment import object_modes
 from harness.experiment.front import Front
 from harness.objectfile.audio.part import with_audio

@@ -12,7 +12,7 @@ from harness.basics.errors import OutOfDomain
 from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
 from harness.cli import invoke
-from harness.effects.force_effects import read_force
+from harness.effects.force import read_force
 from harness.effects.touch_press import press_heights
 from harness.picture.image_file import write_png
 from harness.sim.gel.contact_force import contact_force

@@ -11,6 +11,7 @@ from harness.bench.sensor import GELSIGHT_R15
 from harness.cli import invoke
 from harness.effects.evaluate import evaluate
 from harness.effects.explain import scene_plan
+from harness.effects.quantities import Quantities
 from harness.picture.image_file import read_image, write_png
 from harness.picture.image_metrics import psnr
 from harness.sim.optics.tactile_calibration import shipped_calibration
@@ -59,16 +60,16 @@ def test_a_mesh_is_drawn_as_the_catalogue_draws_it(
     pose = ("--contact", "0.001", "-0.002", "0.0199", "--depth", "0.8mm", "--tilt", "6deg", "--yaw", "40deg")
     answer = answered(capsys, tmp_path, ball, *pose, "--units", "mm", "--height-out", tmp_path / "h.npy")
     mesh = take_in(ball, "mm").mesh
-    given = {
-        "object.mesh": mesh,
-        "contact.gel_from_object": np.array(answer["gel_from_object"])[None],
+    given: Quantities = {
+        "object_mesh": mesh,
+        "contact_gel_from_object": np.array(answer["gel_from_object"])[None],
         "sensor": GELSIGHT_R15,
-        "sensor.calibration": BENCH,
+        "sensor_calibration": BENCH,
     }
     directly = evaluate(scene_plan(scene_from_options("builtin:mug"), GELSIGHT_R15), given)
-    assert np.array_equal(read_image(tmp_path / "a.png"), directly["touch.image"][0])
-    assert np.array_equal(np.load(tmp_path / "h.npy"), directly["touch.height_map"][0])
-    assert answer["contact_pixels"] == int((directly["touch.height_map"] > 0.0).sum())
+    assert np.array_equal(read_image(tmp_path / "a.png"), directly.values["touch_image"][0])
+    assert np.array_equal(np.load(tmp_path / "h.npy"), directly.values["touch_height_map"][0])
+    assert answer["contact_pixels"] == int((directly.values["touch_height_map"] > 0.0).sum())
     ran = {step["effect"] for step in answer["effects"]["ran"]}
     assert ran <= set(answer["seconds"])
     assert not {name for name in ran if name.startswith(("object.modes", "room", "touch.shadow", "arm"))}

@@ -12,7 +12,7 @@ from harness.basics.errors import CalibrationRefused, OutOfDomain, WrongUse
 from harness.basics.files.json_file import write_model
 from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
-from harness.effects.force_effects import pressed_of_gel, table_force
+from harness.effects.force import pressed_of_gel, table_force
 from harness.effects.touch_press import press_heights
 from harness.sim.gel import contact_force as forces
 from harness.sim.gel.elastic import GelElastic

@@ -131,7 +131,7 @@ def test_untouched_dots_are_drawn_where_they_were_measured_and_found_there_again
 def test_a_press_moves_them_by_what_is_computed() -> None:
     gel = known_gel(None, None).with_dots(measured())
     press = press_heights(ball(0.6e-3), "object", gel, scene())
-    moved = press.evaluation["touch.marker_motion"][0]
+    moved = press.evaluation.values["touch_marker_motion"][0]
     alone = marker_displacements(ball(0.6e-3)[None], gel.sensor, rest=measured().in_gel())[0]
     assert np.array_equal(moved, alone)
     away = measured().in_gel() - GELSIGHT_R15.pitch * (np.array([75.0, 62.0]) + 0.5 - (COLUMNS / 2, ROWS / 2))

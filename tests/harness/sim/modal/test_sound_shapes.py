@@ -4,7 +4,6 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,13 +21,14 @@ from harness.basics.mesh import Mesh
 from harness.basics.store import Store
 from harness.bench.scene import SceneFile, Sensors, scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
-from harness.effects import sound_effects
+from harness.effects import sound as sound_effects
 from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import Effect, Facts, knobs_of
 from harness.effects.evaluate import Evaluation, evaluate
 from harness.effects.explain import as_json, scene_plan
 from harness.effects.plan import plan
+from harness.effects.quantities import Quantities
 from harness.effects.scene_object import known_file
 from harness.objectfile.audio.audio import open_audio
 from harness.objectfile.audio.part import AudioPart, with_audio
@@ -51,24 +51,24 @@ def scene_of(folder: Path | None, sound: bool = True) -> SceneFile:
     return scene.model_copy(update={"sensors": Sensors(sound=sound)})
 
 
-def evaluated(scene: SceneFile, sources: dict[str, Any], level: str, most: int = MOST) -> Evaluation:
+def evaluated(scene: SceneFile, sources: Quantities, level: str, most: int = MOST) -> Evaluation:
     accuracy = Accuracy(knobs_of(EFFECTS), {"sound.shapes": level, "sound.modes": most})
     return evaluate(plan(EFFECTS, Facts(scene, GELSIGHT_R15), ["object.modes"], accuracy), sources)
 
 
-def sources_of(mesh: Mesh, **more: Any) -> dict[str, Any]:
-    return {"object.mesh": mesh, "object.wall": None, "object.material": PLASTIC, **more}
+def sources_of(mesh: Mesh, more: Quantities | None = None) -> Quantities:
+    return {"object_mesh": mesh, "object_wall": None, "object_material": PLASTIC, **(more or {})}
 
 
-def modes_at(of: ObjectFile, level: str, most: int = MOST, given: Mapping[str, Any] | None = None) -> Modes:
-    sources = sources_of(egg(), **{"object.file": of, **(given or {})})
-    return from_arrays(evaluated(scene_of(of.folder), sources, level, most)["object.modes"])
+def modes_at(of: ObjectFile, level: str, most: int = MOST, given: Quantities | None = None) -> Modes:
+    sources = sources_of(egg(), {"object_file": of, **(given or {})})
+    return from_arrays(evaluated(scene_of(of.folder), sources, level, most).values["object_modes"])
 
 
 @pytest.fixture(scope="module")
 def solved() -> Modes:
     """Of a ball of plastic that is none, by finite elements."""
-    return from_arrays(evaluated(scene_of(None), sources_of(egg()), "elements")["object.modes"])
+    return from_arrays(evaluated(scene_of(None), sources_of(egg()), "elements").values["object_modes"])
 
 
 @pytest.fixture(scope="module")
@@ -213,7 +213,7 @@ def dented() -> Mesh:
 )
 def test_another_object_is_refused_and_said(of: ObjectFile, mesh: Mesh, said: str) -> None:
     with pytest.raises(WrongUse, match=said):
-        modes_at(of, "table", given={"object.mesh": mesh})
+        modes_at(of, "table", given={"object_mesh": mesh})
     with pytest.raises(WrongUse, match=said):
         known_file(scene_of(of.folder), mesh)
 
@@ -234,7 +234,7 @@ def test_the_same_surface_cut_otherwise_is_the_same_object(of: ObjectFile) -> No
 def test_another_material_is_refused_by_the_constant_that_differs(of: ObjectFile, constant: str) -> None:
     other = replace(PLASTIC, **{constant: 1.01 * vars(PLASTIC)[constant]})
     with pytest.raises(WrongUse, match=f"{constant} .*plastic"):
-        modes_at(of, "table", given={"object.material": other})
+        modes_at(of, "table", given={"object_material": other})
 
 
 def test_a_network_that_was_changed_is_refused(of: ObjectFile, tmp_path: Path) -> None:
@@ -251,13 +251,13 @@ def test_a_network_that_was_changed_is_refused(of: ObjectFile, tmp_path: Path) -
 def test_what_was_stored_of_one_objectfile_is_not_served_for_another(
     of: ObjectFile, solved: Modes, tmp_path: Path
 ) -> None:
-    probe = Effect("probe", ("object.modes",), lambda g, _: g["object.modes"]["shapes"][:1], stored=True)
+    probe = Effect("probe", lambda object_modes: object_modes["shapes"][:1], stored=True)
     effects, store = (*EFFECTS, probe), Store(tmp_path / "store")
 
     def calls(file: ObjectFile, level: str) -> int:
         accuracy = Accuracy(knobs_of(effects), {"sound.shapes": level, "sound.modes": MOST})
         chosen = plan(effects, Facts(scene_of(file.folder), GELSIGHT_R15), ["probe"], accuracy)
-        return evaluate(chosen, sources_of(egg(), **{"object.file": file}), store).calls.get("probe", 0)
+        return evaluate(chosen, sources_of(egg(), {"object_file": file}), store).calls.get("probe", 0)
 
     shutil.copytree(of.folder, tmp_path / "elsewhere")
     modes = canonical(solved)

@@ -1,27 +1,18 @@
-"""The force of a press as an effect: computed where it is asked for, and by nothing else.
+"""The force of a press, as effects and of a reading."""
 
-Sources, beside those of the touch: ``sensor.elastic`` (how stiff the gel is, ``GelElastic``) or, at the level
-``table``, ``sensor.forces`` (``ForceTable``, measured).
-"""
-
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.bench.sensor import TactileSensor
-from harness.effects.accuracy import Knob, Level
-from harness.effects.effect import Effect, Implementation
+from harness.effects.accuracy import Knob
 from harness.sim.gel.contact_force import PARTS, ContactForce, ForceLevel, contact_force, require_depths
 from harness.sim.gel.elastic import GelElastic
 from harness.sim.gel.force_table import ForceTable
 from harness.sim.optics.depth_reading import DepthReading
 
-Given = Mapping[str, Any]
-Levels = Mapping[str, Level]
 FORCE = Knob(
     "touch.force",
     ("table", "winkler", "layer"),
@@ -37,8 +28,6 @@ CELLS = Knob(
 OF_GEL = 0.1
 """Share of the deepest pixel from which the surface of a gel is taken to be pressed."""
 
-_NEEDS = ("touch.height_map", "sensor", "sensor.elastic")
-
 _OTHER_SHARES = (0.05, 0.2)
 """Of the deepest pixel, from which the gel might be taken to be pressed as well."""
 
@@ -53,26 +42,32 @@ class ReadForce:
     uncertainty: float  #: N, one standard deviation.
 
 
-def _by(level: ForceLevel, given: Given, cells: int) -> ContactForce:
-    sensor: TactileSensor = given["sensor"]
-    depth: FloatArray = given["touch.height_map"]
-    return contact_force(depth, sensor.pitch, sensor.gel_thickness, given["sensor.elastic"], level, cells)
+def press_layer(
+    touch_height_map: FloatArray, sensor: TactileSensor, sensor_elastic: GelElastic, *, touch_force_cells: int
+) -> ContactForce:
+    """Compute the force of an elastic layer."""
+    cells = touch_force_cells
+    return contact_force(touch_height_map, sensor.pitch, sensor.gel_thickness, sensor_elastic, "layer", cells)
 
 
-def _by_layer(given: Given, levels: Levels) -> ContactForce:
-    return _by("layer", given, int(levels[CELLS.name]))
+def press_springs(
+    touch_height_map: FloatArray, sensor: TactileSensor, sensor_elastic: GelElastic
+) -> ContactForce:
+    """Compute the force of springs under the contact."""
+    return contact_force(touch_height_map, sensor.pitch, sensor.gel_thickness, sensor_elastic, "winkler")
 
 
-def _by_springs(given: Given, _levels: Levels) -> ContactForce:
-    return _by("winkler", given, 1)
+def look_up_force(
+    touch_height_map: FloatArray, sensor: TactileSensor, sensor_forces: ForceTable | None
+) -> ContactForce:
+    """Look the force up in a measured table.
 
-
-def _by_table(given: Given, _levels: Levels) -> ContactForce:
-    table: ForceTable | None = given["sensor.forces"]
-    if table is None:
+    Raises:
+        WrongUse: there is no table.
+    """
+    if sensor_forces is None:
         raise WrongUse("touch.force=table needs forces that were measured; say --force-table FILE.json")
-    sensor: TactileSensor = given["sensor"]
-    return table_force(given["touch.height_map"], sensor.pitch, sensor.gel_thickness, table)
+    return table_force(touch_height_map, sensor.pitch, sensor.gel_thickness, sensor_forces)
 
 
 def pressed_of_gel(surface: FloatArray, share: float = OF_GEL) -> FloatArray:
@@ -111,19 +106,6 @@ def table_force(depth: FloatArray, pitch: float, thickness: float, table: ForceT
     scatter = np.divide(sigma, newtons, out=np.zeros_like(newtons), where=newtons > 0.0)
     shares[:, PARTS.index("theory")] = scatter
     return ContactForce.of(depth, springs[:, None, None] * depth, shares, pitch, thickness)
-
-
-FORCE_EFFECT = Effect(
-    "touch.force",
-    _NEEDS,
-    _by_layer,
-    knobs=(CELLS,),
-    choice=FORCE,
-    ways={
-        "winkler": Implementation(_NEEDS, _by_springs),
-        "table": Implementation(("touch.height_map", "sensor", "sensor.forces"), _by_table),
-    },
-)
 
 
 def read_force(
