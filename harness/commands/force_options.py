@@ -101,7 +101,7 @@ def force_json(press: "Press") -> dict[str, Any]:
     found = press.force
     if found is None:
         return {"force_n": None, "force_uncertainty_n": None, "force": None}
-    level = str(press.levels[LEVEL])
+    level = str(press.plan.levels[LEVEL])
     gel = None if level == "table" else press.gel.elastic
     said = described(found, level, gel, lower_bound(press))
     if gel is None and press.gel.forces is not None:
@@ -144,7 +144,7 @@ def force_notes(press: "Press") -> list[str]:
     """What the operator should know of the force."""
     if press.force is None:
         return []
-    gel = None if press.levels[LEVEL] == "table" else press.gel.elastic
+    gel = None if press.plan.levels[LEVEL] == "table" else press.gel.elastic
     return noted(press.force, gel, lower_bound(press))
 
 

@@ -92,12 +92,6 @@ class Accuracy(Mapping[str, Level]):
         """Every knob where nobody chooses."""
         return cls(tuple(knobs), {})
 
-    @classmethod
-    def finest(cls, knobs: Iterable[Knob[Level]]) -> "Accuracy":
-        """Every knob at its most exact level."""
-        knobs = tuple(knobs)
-        return cls(knobs, {knob.name: knob.levels[-1] for knob in knobs})
-
     def with_(self, changes: Mapping[str, Level]) -> "Accuracy":
         """The same choice but for ``changes``; ``WrongUse`` for an unknown knob or level."""
         return Accuracy(self.knobs, {**self.levels, **changes})

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from harness.bench.scene import SceneFile
 from harness.effects import camera, force, sound, touch
 from harness.effects.accuracy import Knob, Level
-from harness.effects.effect import Condition, Effect, Implementation, build_catalogue
+from harness.effects.effect import Condition, Effect, build_catalogue
 from harness.effects.scene_object import named_file
 from harness.objectfile.description import Description
 from harness.objectfile.entries import Modality
@@ -41,8 +41,8 @@ SOUND_EFFECTS = (
         stored=True,
         choice=sound.SHAPES,
         ways={
-            "network": Implementation(sound.evaluate_network, when=NAMED, knobs=(sound.MODES,)),
-            "table": Implementation(sound.read_table, when=NAMED, knobs=(sound.MODES,)),
+            "network": Effect("object.modes", sound.evaluate_network, when=NAMED, knobs=(sound.MODES,)),
+            "table": Effect("object.modes", sound.read_table, when=NAMED, knobs=(sound.MODES,)),
         },
     ),
     Effect("object.sound", sound.ring_object, when=SOUND),
@@ -59,8 +59,8 @@ EFFECTS = build_catalogue(
         knobs=(force.CELLS,),
         choice=force.FORCE,
         ways={
-            "winkler": Implementation(force.press_springs),
-            "table": Implementation(force.look_up_force),
+            "winkler": Effect("touch.force", force.press_springs),
+            "table": Effect("touch.force", force.look_up_force),
         },
     ),
     Effect("contact.presses", touch.find_presses),
@@ -70,7 +70,7 @@ EFFECTS = build_catalogue(
         touch.deform_gel,
         knobs=(touch.GEL,),
         choice=touch.SHAPES,
-        ways={"network": Implementation(touch.decode_gel, when=NAMED)},
+        ways={"network": Effect("touch.gel", touch.decode_gel, when=NAMED)},
     ),
     Effect("touch.colour", touch.render_colour, knobs=(touch.OPTICS,)),
     Effect("touch.darkening", touch.compute_darkening, when=SHADOW),
@@ -91,7 +91,7 @@ EFFECTS = build_catalogue(
         camera.gather_image,
         when=CAMERA,
         choice=camera.LOOK,
-        ways={"network": Implementation(camera.render_network, when=NAMED)},
+        ways={"network": Effect("camera.image", camera.render_network, when=NAMED)},
     ),
 )
 
@@ -105,11 +105,7 @@ DIALS: Mapping[Modality, Knob[Level]] = {"audio": sound.SHAPES, "touch": touch.S
 def senses_of(scene: SceneFile) -> tuple[Modality, ...]:
     """Return the senses that a scene calls for, by the names of an ObjectFile's parts."""
     sensors = scene.sensors
-    wanted: dict[Modality, bool] = {
-        "audio": sensors.sound,
-        "touch": sensors.touch,
-        "vision": sensors.camera,
-    }
+    wanted: dict[Modality, bool] = {"audio": sensors.sound, "touch": sensors.touch, "vision": sensors.camera}
     return tuple(sense for sense, called_for in wanted.items() if called_for)
 
 

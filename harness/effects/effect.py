@@ -8,8 +8,8 @@ is a source that a caller may leave out. A keyword-only parameter is the level o
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
-from inspect import Parameter, formatannotation, signature
-from typing import ForwardRef, Literal, get_args, get_origin
+from inspect import Parameter, signature
+from typing import ForwardRef
 
 from harness.bench.scene import SceneFile
 from harness.bench.sensor import TactileSensor
@@ -48,17 +48,6 @@ class Condition:
 
 
 @dataclass(frozen=True)
-class Implementation:
-    """A function that computes the quantity of an effect at one level of its ``choice``."""
-
-    compute: Compute  #: pure; its parameters name its needs and its knobs.
-    when: Condition | None = None  #: the scene has what it is computed from; None for always.
-    knobs: tuple[Knob[Level], ...] = ()  #: that its keyword-only parameters are levels of.
-    version: int = 1  #: raised with every change of what it computes, so that stored results are dropped.
-    stored: bool = False  #: whether a result is worth keeping on disk.
-
-
-@dataclass(frozen=True)
 class Effect:
     """One quantity that can be computed from others."""
 
@@ -71,17 +60,18 @@ class Effect:
     knobs: tuple[Knob[Level], ...] = ()  #: that its keyword-only parameters are levels of.
     version: int = 1  #: raised with every change of what it computes, so that stored results are dropped.
     stored: bool = False  #: whether a result is worth keeping on disk.
-    choice: Knob[Level] | None = None  #: between implementations; None where there is one.
-    ways: Mapping[Level, Implementation] = field(default_factory=dict, hash=False)
-    """by the levels of ``choice``; the effect's own is for the levels not named here."""
+    choice: Knob[Level] | None = None  #: between this function and others; None where there is one.
+    ways: Mapping[Level, "Effect"] = field(default_factory=dict, hash=False)
+    """the same quantity by other functions, by the levels of ``choice``; each with a condition, knobs, a
+    version and storing of its own. This function is for the levels not named here."""
 
     @property
     def needs(self) -> tuple[str, ...]:
         """Quantities that it is always computed from, in the order of the parameters."""
         return needs_of(self.compute)
 
-    def way(self, accuracy: Accuracy) -> Implementation | None:
-        """Return the implementation that an accuracy chooses; None for the effect's own."""
+    def way(self, accuracy: Accuracy) -> "Effect | None":
+        """Return the row that an accuracy chooses in place of this one; None for this one."""
         return None if self.choice is None else self.ways.get(accuracy[self.choice.name])
 
     def at(self, accuracy: Accuracy) -> "Effect":
@@ -89,15 +79,12 @@ class Effect:
         way = self.way(accuracy)
         if way is None:
             return self
-        return replace(self, compute=way.compute, knobs=way.knobs, version=way.version, stored=way.stored)
-
-
-_BY_NAME = (Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY)
+        return replace(way, when=self.when, bypass=self.bypass, choice=self.choice, ways=self.ways)
 
 
 @cache
-def _parameters(compute: Compute) -> tuple[Parameter, ...]:
-    return tuple(signature(compute).parameters.values())
+def _parameters(compute: Compute) -> Mapping[str, Parameter]:
+    return signature(compute).parameters
 
 
 def needs_of(compute: Compute, given: frozenset[str] = frozenset()) -> tuple[str, ...]:
@@ -107,12 +94,12 @@ def needs_of(compute: Compute, given: frozenset[str] = frozenset()) -> tuple[str
         compute: of an effect.
         given: sources; a parameter with a default counts only where it is one of them.
     """
-    names = [
-        (quantity_name(each.name), each.default is Parameter.empty)
-        for each in _parameters(compute)
-        if each.kind is Parameter.POSITIONAL_OR_KEYWORD
-    ]
-    return tuple(name for name, required in names if required or name in given)
+    return tuple(
+        quantity_name(name)
+        for name, each in _parameters(compute).items()
+        if each.kind is not Parameter.KEYWORD_ONLY
+        and (each.default is Parameter.empty or quantity_name(name) in given)
+    )
 
 
 def build_catalogue(*effects: Effect, quantities: type = Quantities) -> tuple[Effect, ...]:
@@ -120,17 +107,14 @@ def build_catalogue(*effects: Effect, quantities: type = Quantities) -> tuple[Ef
 
     Args:
         effects: in the order in which ``explain`` lists them.
-        quantities: a ``TypedDict`` with the types of sources and quantities by their parameter names; a
+        quantities: a ``TypedDict`` with the types of sources and quantities by the names of parameters; a
             quantity that it leaves out has the type that its effect returns.
 
     Raises:
-        ValueError: two effects provide one quantity; a bypass that the effect does not need; an
-            implementation of no level; or a function whose parameters do not fit its row, the quantities or
-            the knobs.
+        ValueError: two effects provide one quantity; a bypass that the effect does not need; a function for
+            no level; or a function whose parameters do not fit its row, the quantities or the knobs.
     """
-    types: dict[str, object] = {
-        quantity_name(name): kind for name, kind in quantities.__annotations__.items()
-    }
+    types: dict[str, object] = dict(quantities.__annotations__)
     provided: set[str] = set()
     for effect in effects:
         if effect.provides in provided:
@@ -141,78 +125,53 @@ def build_catalogue(*effects: Effect, quantities: type = Quantities) -> tuple[Ef
         if any(level not in levels for level in effect.ways):
             raise ValueError(f"the ways of {effect.provides} are {list(effect.ways)}, its levels {levels}")
         provided.add(effect.provides)
-        types.setdefault(effect.provides, signature(effect.compute).return_annotation)
+        types.setdefault(parameter_name(effect.provides), signature(effect.compute).return_annotation)
     for effect in effects:
-        _require_types(effect.provides, effect.compute, effect.knobs, types)
-        for way in effect.ways.values():
-            _require_types(effect.provides, way.compute, way.knobs, types)
+        for row in (effect, *effect.ways.values()):
+            if row.provides != effect.provides:
+                raise ValueError(f"{row.provides} is no way to compute {effect.provides}")
+            _require_types(row, types)
     return effects
 
 
-def _require_types(
-    provides: str, compute: Compute, knobs: tuple[Knob[Level], ...], types: Mapping[str, object]
-) -> None:
-    """Refuse a function whose annotations are not those of the quantities and knobs that it names."""
-    home = f"the effect {provides} ({compute.__qualname__})"
-    returned = signature(compute).return_annotation
-    if not _same(returned, types[provides]):
-        raise ValueError(f"{home} returns {_text(returned)}, and {provides} is {_text(types[provides])}")
-    levels = {parameter_name(knob.name): knob.levels for knob in knobs}
-    for name, kind in ((each.name, each.kind) for each in _parameters(compute)):
-        if (kind is Parameter.KEYWORD_ONLY) != (name in levels) or kind not in _BY_NAME:
+def _require_types(effect: Effect, types: Mapping[str, object]) -> None:
+    """Refuse a function whose parameters and type are not those of its knobs and of the quantities."""
+    home = f"the effect {effect.provides} ({effect.compute.__qualname__})"
+    returned, provided = signature(effect.compute).return_annotation, types[parameter_name(effect.provides)]
+    if not _is_same(returned, provided):
+        raise ValueError(f"{home} returns {_text(returned)}, and {effect.provides} is {_text(provided)}")
+    levels, knobs = [], [knob.name for knob in effect.knobs]
+    for name, each in _parameters(effect.compute).items():
+        if each.kind is Parameter.KEYWORD_ONLY:
+            levels.append(quantity_name(name))
+        elif name not in types:
+            raise ValueError(f"{home} needs {quantity_name(name)}, which no effect provides and no source is")
+        elif not _is_same(each.annotation, types[name]):
             raise ValueError(
-                f"{home}: the parameter {name} is a {kind.description} one, and the knobs of the row are "
-                f"{list(levels)}; quantities stand before the *, and levels of knobs after it"
+                f"{home}: the parameter {name} is {_text(each.annotation)}, and {quantity_name(name)} is "
+                f"{_text(types[name])}"
             )
-    for name in set(levels) - {each.name for each in _parameters(compute)}:
-        raise ValueError(f"{home} takes no level {name}, and its row has that knob")
-    for each in _parameters(compute):
-        quantity = quantity_name(each.name)
-        if each.name in levels:
-            if not all(_takes(each.annotation, level) for level in levels[each.name]):
-                raise ValueError(
-                    f"{home}: the level {each.name} is {_text(each.annotation)}, and the knob {quantity} has "
-                    f"the levels {levels[each.name]}"
-                )
-        elif quantity not in types:
-            raise ValueError(f"{home} needs {quantity}, which is no source, and no effect provides it")
-        elif not _same(each.annotation, types[quantity]):
-            raise ValueError(
-                f"{home}: the parameter {each.name} is {_text(each.annotation)}, and {quantity} is "
-                f"{_text(types[quantity])}"
-            )
+    if sorted(levels) != sorted(knobs):
+        raise ValueError(f"{home}: the levels after its * are {levels}, and the knobs of its row {knobs}")
 
 
-def _takes(annotation: object, level: Level) -> bool:
-    """Whether a parameter with this annotation takes a level."""
-    if get_origin(annotation) is Literal:
-        return level in get_args(annotation)
-    return annotation is type(level) or (annotation is float and isinstance(level, int))
-
-
-def _same(one: object, other: object) -> bool:
-    """Whether two annotations are one; the name decides for a type that only its user imports."""
-    if isinstance(one, str | ForwardRef) or isinstance(other, str | ForwardRef):
-        return _text(one) == _text(other)
-    return one == other
+def _is_same(one: object, other: object) -> bool:
+    """Whether two annotations are one; the name decides for a class that only type checkers import."""
+    named = isinstance(one, str | ForwardRef) or isinstance(other, str | ForwardRef)
+    return _text(one) == _text(other) if named else one == other
 
 
 def _text(annotation: object) -> str:
     if isinstance(annotation, ForwardRef):
         return annotation.__forward_arg__
-    if isinstance(annotation, str):
-        return annotation
-    if isinstance(annotation, type) and not get_args(annotation):
-        return annotation.__name__
-    return formatannotation(annotation)
+    return annotation.__name__ if isinstance(annotation, type) else str(annotation)
 
 
 def knobs_of(effects: Iterable[Effect]) -> tuple[Knob[Level], ...]:
     """Return every knob of the effects, once, in order."""
-    found = {knob.name: knob for effect in effects for knob in _knobs(effect)}
+    found: dict[str, Knob[Level]] = {}
+    for effect in effects:
+        chosen = () if effect.choice is None else (effect.choice,)
+        for knob in (*chosen, *effect.knobs, *knobs_of(effect.ways.values())):
+            found.setdefault(knob.name, knob)
     return tuple(found.values())
-
-
-def _knobs(effect: Effect) -> tuple[Knob[Level], ...]:
-    chosen = () if effect.choice is None else (effect.choice,)
-    return (*chosen, *effect.knobs, *(knob for way in effect.ways.values() for knob in way.knobs))

@@ -3,16 +3,53 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from types import MappingProxyType
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import WrongUse
 from harness.basics.store import Storable, Store, digest
-from harness.effects.effect import Effect, parameter_name
+from harness.effects.effect import parameter_name
 from harness.effects.plan import Plan, PlannedEffect
-from harness.effects.quantities import PictureResult, Quantities, SoundResult, TouchResult
+from harness.effects.quantities import Quantities
+from harness.sim.gel.contact_force import ContactForce
+from harness.sim.light.direct_image import DirectImage
+from harness.sim.modal.modal import from_arrays
+from harness.sim.modal.modes import Modes
+
+if TYPE_CHECKING:
+    from harness.objectfile.touch.touch import ObjectTouch
+    from harness.objectfile.vision.render import Rendered
+
+
+@dataclass(frozen=True, eq=False)
+class TouchResult:
+    """The touch of an evaluation; None for a quantity that was not computed. ``n`` counts the contacts."""
+
+    height_map: FloatArray | None  #: ``(n, rows, columns)`` m, the object in the undeformed gel.
+    gel: FloatArray | None  #: ``(n, rows, columns)`` m of indentation of the gel's surface.
+    image: ByteArray | None  #: ``(n, rows, columns, 3)`` RGB.
+    shadow_out_of_table: FloatArray | None  #: ``(n,)`` share of the rim whose depth is not in the table.
+    force: ContactForce | None
+    codes: "ObjectTouch | None"  #: that the gel's surface comes from.
+
+
+@dataclass(frozen=True, eq=False)
+class SoundResult:
+    """The sound of an evaluation; None for a quantity that was not computed. ``k`` counts the strikes."""
+
+    modes: Modes | None
+    sound: FloatArray | None  #: ``(k, t)`` Pa in the open.
+    pressure: FloatArray | None  #: ``(k, t)`` Pa as the microphone reports them.
+
+
+@dataclass(frozen=True, eq=False)
+class PictureResult:
+    """The scene camera's part of an evaluation; None for a quantity that was not computed."""
+
+    image: "DirectImage | Rendered | None"
 
 
 @dataclass(frozen=True)
@@ -32,18 +69,28 @@ class Evaluation:
 
     @property
     def touch(self) -> TouchResult:
-        """The gel and its picture."""
-        return TouchResult.of(self.values)
+        """The gel, its picture and its force."""
+        values = self.values
+        return TouchResult(
+            values.get("touch_height_map"),
+            values.get("touch_gel"),
+            values.get("touch_image"),
+            values.get("touch_shadow_out_of_table"),
+            values.get("touch_force"),
+            values.get("object_touch_codes"),
+        )
 
     @property
     def sound(self) -> SoundResult:
         """The modes and their sound."""
-        return SoundResult.of(self.values)
+        values = self.values
+        modes = None if "object_modes" not in values else from_arrays(values["object_modes"])
+        return SoundResult(modes, values.get("object_sound"), values.get("microphone_pressure"))
 
     @property
     def picture(self) -> PictureResult:
         """The scene camera's picture."""
-        return PictureResult.of(self.values)
+        return PictureResult(self.values.get("camera_image"))
 
 
 def evaluate(plan: Plan, sources: Quantities, store: Store | None = None) -> Evaluation:
@@ -98,58 +145,46 @@ class _Run:
         }
 
     def value(self, quantity: str) -> object:
-        """Return a quantity, computed on first use."""
+        """Return a quantity, read from the store or computed on first use."""
         name = self.plan.resolved(quantity)
         parameter = parameter_name(name)
-        if parameter not in self.values and not self._read(self._planned[name]):
-            self._compute(self._planned[name])
+        if parameter not in self.values:
+            self.values[parameter] = frozen(self._provide(self._planned[name]))
         return self.values[parameter]
 
-    def _compute(self, step: PlannedEffect) -> None:
-        effect = step.effect
+    def _provide(self, step: PlannedEffect) -> object:
+        effect, name = step.effect, step.effect.provides
+        store = self.store if effect.stored else None
+        start = now()
+        found: object = None if store is None else store.get(self._key(name))
+        if found is not None:
+            self.seconds[name] = now() - start
+            self.from_store.append(name)
+            return found
         given = {parameter_name(need): self.value(need) for need in step.needs}
         levels = {parameter_name(knob.name): step.levels[knob.name] for knob in effect.knobs}
         start = now()
-        result = frozen(effect.compute(**given, **levels))
-        self.seconds[effect.provides] = now() - start
-        self.calls[effect.provides] = self.calls.get(effect.provides, 0) + 1
-        self.values[parameter_name(effect.provides)] = result
-        if self.store is not None and effect.stored:
-            self.store.put(self._key(effect), cast(Storable, result))
+        found = effect.compute(**given, **levels)
+        self.seconds[name] = now() - start
+        self.calls[name] = self.calls.get(name, 0) + 1
+        if store is not None:
+            store.put(self._key(name), cast(Storable, found))
+        return found
 
-    def _read(self, step: PlannedEffect) -> bool:
-        """Whether the store had the result."""
-        effect = step.effect
-        if self.store is None or not effect.stored:
-            return False
-        start = now()
-        found = self.store.get(self._key(effect))
-        if found is None:
-            return False
-        self.values[parameter_name(effect.provides)] = frozen(found)
-        self.seconds[effect.provides] = now() - start
-        self.from_store.append(effect.provides)
-        return True
-
-    def _key(self, effect: Effect) -> str:
-        """Hash what the result depends on: the effect's version and levels, and the same of all before it."""
-        step = self._planned[effect.provides]
-        if effect.provides not in self._keys:
-            needs = [self._input_key(need) for need in step.needs]
-            # The levels that tell a result from others.
+    def _key(self, quantity: str) -> str:
+        """Hash what a quantity depends on: the effect's version and levels, and the same of all before it."""
+        name = self.plan.resolved(quantity)
+        if name not in self._keys and name not in self._planned:
+            self._keys[name] = digest(self.values[parameter_name(name)])
+        elif name not in self._keys:
+            step = self._planned[name]
+            needs = tuple(self._key(need) for need in step.needs)
+            # The levels that distinguish a result from others.
             choice, levels = step.effect.choice, dict(step.levels)
             if choice is not None and levels[choice.name] not in step.effect.ways:
                 del levels[choice.name]
-            about = (effect.provides, effect.version, tuple(needs), tuple(sorted(levels.items())))
-            self._keys[effect.provides] = digest(about)
-        return self._keys[effect.provides]
-
-    def _input_key(self, need: str) -> str:
-        name = self.plan.resolved(need)
-        if name in self._planned:
-            return self._key(self._planned[name].effect)
-        if name not in self._keys:
-            self._keys[name] = digest(self.values[parameter_name(name)])
+            about = (name, step.effect.version, needs, tuple(sorted(levels.items())))
+            self._keys[name] = digest(about)
         return self._keys[name]
 
 

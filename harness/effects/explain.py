@@ -1,7 +1,7 @@
 """A plan in words: which effects run and which not, and why."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import NotRequired, TypedDict
 
 from rich.table import Table
@@ -14,7 +14,7 @@ from harness.effects.effect import Facts
 from harness.effects.plan import Plan, default_accuracy, plan
 from harness.effects.scene_object import named_file
 from harness.objectfile.description import Description
-from harness.objectfile.entries import Modality, NetworkEntry
+from harness.objectfile.entries import Modality
 
 MODES = "object.modes"
 
@@ -23,9 +23,6 @@ _INSTEAD_OF: Mapping[Modality, str] = {
     "touch": "rasteriser and skirt: candidates' tactile images, and the readings' at the answer",
     "vision": "rays on the mesh: the scene camera's picture",
 }
-
-_OTHER = ("seconds_", "bytes")
-"""What a model card says beside errors, by how the name begins."""
 
 
 @dataclass(frozen=True)
@@ -146,27 +143,24 @@ def networks_at(of: Description, levels: Mapping[str, Level]) -> tuple[NetworkIn
         of: what its ``object.json`` says.
         levels: by the names of dials.
     """
-    networks = of.networks
-    return tuple(
-        _in_use(sense, networks[sense])
-        for sense, dial in DIALS.items()
-        if levels.get(dial.name) == NETWORK and sense in networks
-    )
+    found = []
+    for sense, dial in DIALS.items():
+        if levels.get(dial.name) == NETWORK and sense in of.networks:
+            entry = of.networks[sense]
+            other = ("seconds_", "bytes")
+            errors = {name: value for name, value in entry.measured.items() if not name.startswith(other)}
+            seconds = {
+                name.removeprefix("seconds_").replace("_", " "): value
+                for name, value in entry.measured.items()
+                if name.startswith("seconds_")
+            }
+            found.append(NetworkInUse(dial.name, entry.file, _INSTEAD_OF[sense], errors, seconds))
+    return tuple(found)
 
 
 def networks_as_json(networks: tuple[NetworkInUse, ...]) -> list[dict[str, object]]:
     """``[{dial, level, file, instead_of, errors, seconds}]``."""
-    return [
-        {
-            "dial": each.dial,
-            "level": NETWORK,
-            "file": each.file,
-            "instead_of": each.instead_of,
-            "errors": dict(each.errors),
-            "seconds": dict(each.seconds),
-        }
-        for each in networks
-    ]
+    return [{"dial": each.dial, "level": NETWORK, **asdict(each)} for each in networks]
 
 
 def networks_as_table(networks: tuple[NetworkInUse, ...]) -> Table:
@@ -178,14 +172,6 @@ def networks_as_table(networks: tuple[NetworkInUse, ...]) -> Table:
         errors, seconds = _listed(each.errors), _listed(each.seconds)
         table.add_row(f"{each.dial} = {NETWORK}", each.file, each.instead_of, errors, seconds)
     return table
-
-
-def _in_use(sense: Modality, entry: NetworkEntry) -> NetworkInUse:
-    measured = entry.measured
-    errors = {name: value for name, value in measured.items() if not name.startswith(_OTHER)}
-    begun = {name: value for name, value in measured.items() if name.startswith("seconds_")}
-    seconds = {name.removeprefix("seconds_").replace("_", " "): value for name, value in begun.items()}
-    return NetworkInUse(DIALS[sense].name, entry.file, _INSTEAD_OF[sense], errors, seconds)
 
 
 def _listed(numbers: Mapping[str, float]) -> str:

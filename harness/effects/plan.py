@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from harness.basics.errors import WrongUse
 from harness.basics.files.named_file import nearest
-from harness.effects.accuracy import Accuracy, Knob, Level
+from harness.effects.accuracy import Accuracy, Level
 from harness.effects.effect import Effect, Facts, knobs_of, needs_of
 
 
@@ -37,6 +37,11 @@ class Plan:
     skipped: tuple[SkippedEffect, ...]  #: every other effect of the catalogue but those that are supplied.
     aliases: Mapping[str, str]  #: quantities whose effect is bypassed, and what takes their place.
     sources: tuple[str, ...]  #: quantities that must be given.
+
+    @property
+    def levels(self) -> dict[str, Level]:
+        """The level of every knob of an effect that runs."""
+        return {name: level for step in self.ran for name, level in step.levels.items()}
 
     def resolved(self, quantity: str) -> str:
         """The quantity that stands for ``quantity`` once bypassed effects are passed through."""
@@ -71,13 +76,25 @@ class _Search:
             return
         path = (*path, quantity)
         if effect.when is None or effect.when.holds(self.facts):
-            _require_way(effect, self.facts, self.accuracy)
+            self._require_way(effect)
             for need in needs_of(effect.compute, self.supplied):
                 self.visit(need, quantity, path)
             self.order.append(quantity)
+        elif effect.bypass is not None:
+            self.aliases[quantity] = effect.bypass
+            self.visit(effect.bypass, asked_by, path)
         else:
-            self.aliases[quantity] = _bypass(effect, asked_by)
-            self.visit(self.aliases[quantity], asked_by, path)
+            who = f"{asked_by} needs {quantity}" if asked_by else f"{quantity} is asked for"
+            raise WrongUse(f"{who}, but {effect.when.otherwise}; change the scene, or do not ask for it")
+
+    def _require_way(self, effect: Effect) -> None:
+        way, choice = effect.way(self.accuracy), effect.choice
+        if choice is None or way is None or way.when is None or way.when.holds(self.facts):
+            return
+        raise WrongUse(
+            f"{choice.name} = {self.accuracy[choice.name]}: {way.when.otherwise}; change the scene, or take "
+            f"{choice.name} = {choice.default}"
+        )
 
 
 def plan(
@@ -123,46 +140,24 @@ def default_accuracy(effects: Iterable[Effect]) -> Accuracy:
     return Accuracy.default(knobs_of(effects))
 
 
-def _bypass(effect: Effect, asked_by: str) -> str:
-    if effect.bypass is not None:
-        return effect.bypass
-    assert effect.when is not None
-    who = f"{asked_by} needs {effect.provides}" if asked_by else f"{effect.provides} is asked for"
-    raise WrongUse(f"{who}, but {effect.when.otherwise}; change the scene, or do not ask for it")
-
-
-def _require_way(effect: Effect, facts: Facts, accuracy: Accuracy) -> None:
-    way = effect.way(accuracy)
-    if way is None or way.when is None or way.when.holds(facts):
-        return
-    assert effect.choice is not None
-    name, level = effect.choice.name, accuracy[effect.choice.name]
-    raise WrongUse(
-        f"{name} = {level}: {way.when.otherwise}; change the scene, or take {name} = {effect.choice.default}"
-    )
-
-
 def _planned(effect: Effect, search: _Search) -> PlannedEffect:
     asked_by, accuracy = search.asked_by[effect.provides], search.accuracy
     who = [f"{name} needs it" for name in asked_by if name]
     reasons = (["it is asked for"] if "" in asked_by else []) + who
     if effect.when is not None:
         reasons.append(effect.when.because)
-    knobs = effect.knobs
-    if effect.choice is not None:
-        knobs = (effect.choice, *knobs)
-        reasons.append(_why_this_way(effect, effect.choice, accuracy))
+    knobs, choice = effect.knobs, effect.choice
+    if choice is not None:
+        knobs = (choice, *knobs)
+        way, level = effect.way(accuracy), accuracy[choice.name]
+        why = f"{choice.name} is {level}"
+        if way is not None and way.when is not None:
+            why += f", and {way.when.because}"
+        elif level == choice.default:
+            why += ", its default"
+        reasons.append(why)
     levels = MappingProxyType({knob.name: accuracy[knob.name] for knob in knobs})
-    needs = needs_of(effect.compute, search.supplied)
-    return PlannedEffect(effect, needs, "; ".join(reasons), levels)
-
-
-def _why_this_way(effect: Effect, choice: Knob[Level], accuracy: Accuracy) -> str:
-    way, level = effect.way(accuracy), accuracy[choice.name]
-    said = f"{choice.name} is {level}"
-    if way is not None and way.when is not None:
-        return f"{said}, and {way.when.because}"
-    return f"{said}, its default" if level == choice.default else said
+    return PlannedEffect(effect, needs_of(effect.compute, search.supplied), "; ".join(reasons), levels)
 
 
 def _why_not(effect: Effect, search: _Search) -> str:

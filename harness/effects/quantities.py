@@ -1,11 +1,10 @@
-"""The types of every quantity of the simulation: those that are given, those that are computed, and results.
+"""The type of every quantity of the simulation, given or computed.
 
 A quantity's key is the name of the parameter that takes it: ``touch_gel`` is ``touch.gel`` for ``explain``,
 JSON and the store. ``n`` is the batch axis of contacts.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypedDict
 
 from harness.basics.arrays import AnyArray, ByteArray, FloatArray, IntArray
@@ -22,8 +21,6 @@ from harness.sim.gel.marker_file import MarkerFile
 from harness.sim.gel.presses import Presses
 from harness.sim.light.appearance import Appearance
 from harness.sim.light.direct_image import DirectImage, LitObject, VisibleSurface
-from harness.sim.modal.modal import from_arrays
-from harness.sim.modal.modes import Modes
 from harness.sim.optics.optics import TactileImages
 from harness.sim.optics.shadow import ShadowTable
 from harness.sim.optics.tactile_calibration import Float32Array, TactileCalibration
@@ -94,58 +91,3 @@ class Quantities(TypedDict, total=False):
     camera_shadow: FloatArray  #: the same with the object in its own light's way.
     object_vision: "ObjectVision"
     camera_image: "DirectImage | Rendered"
-
-
-@dataclass(frozen=True, eq=False)
-class TouchResult:
-    """The touch of an evaluation; None for a quantity that was not computed."""
-
-    height_map: FloatArray | None  #: ``(n, rows, columns)`` m, the object in the undeformed gel.
-    gel: FloatArray | None  #: ``(n, rows, columns)`` m of indentation of the gel's surface.
-    image: ByteArray | None  #: ``(n, rows, columns, 3)`` RGB.
-    marker_motion: FloatArray | None  #: ``(n, markers, 2)`` m, x and y in ``gel``.
-    shadow_out_of_table: FloatArray | None  #: ``(n,)`` share of the rim whose depth is not in the table.
-    force: ContactForce | None
-    codes: "ObjectTouch | None"  #: that the gel's surface comes from.
-
-    @classmethod
-    def of(cls, values: Quantities) -> "TouchResult":
-        """Select the touch of an evaluation's quantities."""
-        return cls(
-            values.get("touch_height_map"),
-            values.get("touch_gel"),
-            values.get("touch_image"),
-            values.get("touch_marker_motion"),
-            values.get("touch_shadow_out_of_table"),
-            values.get("touch_force"),
-            values.get("object_touch_codes"),
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class SoundResult:
-    """The sound of an evaluation; None for a quantity that was not computed."""
-
-    modes: Modes | None
-    sound: FloatArray | None  #: ``(k, t)`` Pa in the open, of each strike.
-    pressure: FloatArray | None  #: ``(k, t)`` Pa as the microphone reports them.
-
-    @classmethod
-    def of(cls, values: Quantities) -> "SoundResult":
-        """Select the sound of an evaluation's quantities."""
-        stored = values.get("object_modes")
-        modes = None if stored is None else from_arrays(stored)
-        return cls(modes, values.get("object_sound"), values.get("microphone_pressure"))
-
-
-@dataclass(frozen=True, eq=False)
-class PictureResult:
-    """The scene camera's part of an evaluation; None for a quantity that was not computed."""
-
-    seen: VisibleSurface | None
-    image: "DirectImage | Rendered | None"
-
-    @classmethod
-    def of(cls, values: Quantities) -> "PictureResult":
-        """Select the picture of an evaluation's quantities."""
-        return cls(values.get("camera_seen"), values.get("camera_image"))

@@ -144,7 +144,9 @@ def render_images(
     Raises:
         CalibrationRefused: a level that the calibration does not have.
     """
-    return prepare_optics(sensor_calibration, touch_optics, sensor, sensor_rest).render(touch_gel)
+    if sensor_rest is not None:
+        return Optics(sensor_calibration, touch_optics, sensor_rest).render(touch_gel)
+    return prepare_optics(sensor_calibration, touch_optics, sensor).render(touch_gel)
 
 
 def render_colour(
@@ -155,7 +157,7 @@ def render_colour(
     touch_optics: OpticsLevel,
 ) -> ByteArray:
     """Render the gel's colours; raises as ``render_images``."""
-    return prepare_optics(sensor_calibration, touch_optics, sensor).render(touch_gel).images
+    return render_images(touch_gel, sensor, sensor_calibration, touch_optics=touch_optics).images
 
 
 def select_colour(touch_drawn: TactileImages) -> ByteArray:
@@ -183,15 +185,8 @@ def compute_darkening(
     sensor_rest: FloatArray | None = None,
 ) -> tuple[Float32Array, FloatArray]:
     """Compute how much shadows darken each picture, as ``harness.sim.optics.shadow_image.darkening``."""
-    return darkening(
-        touch_colour,
-        touch_height_map,
-        touch_gel,
-        sensor,
-        sensor_calibration,
-        sensor_shadow_table,
-        sensor_rest,
-    )
+    calibration, table = sensor_calibration, sensor_shadow_table
+    return darkening(touch_colour, touch_height_map, touch_gel, sensor, calibration, table, sensor_rest)
 
 
 def cast_shadow(touch_colour: ByteArray, touch_darkening: tuple[Float32Array, FloatArray]) -> ByteArray:
@@ -242,43 +237,11 @@ def quantize_image(touch_noise: ByteArray | FloatArray) -> ByteArray:
     return np.clip(np.rint(touch_noise), 0.0, 255.0).astype(np.uint8)
 
 
-def prepare_optics(
-    calibration: TactileCalibration,
-    level: OpticsLevel,
-    sensor: TactileSensor,
-    rest: FloatArray | None = None,
-) -> Optics:
-    """Prepare a calibration for rendering; the last four stay in memory.
-
-    Args:
-        calibration: of the colours.
-        level: of the optics.
-        sensor: gives the untouched gel where ``rest`` does not.
-        rest: ``(rows, columns)`` m towards the camera, the untouched gel; None for the sensor's.
+@lru_cache(maxsize=4)
+def prepare_optics(calibration: TactileCalibration, level: OpticsLevel, sensor: TactileSensor) -> Optics:
+    """Prepare a calibration to render a sensor's own untouched gel, flat or a dome.
 
     Raises:
         CalibrationRefused: a level that the calibration does not have.
     """
-    return _optics(calibration, level, sensor, _Rest(rest))
-
-
-class _Rest:
-    """An array that a cache compares by identity."""
-
-    def __init__(self, surface: FloatArray | None) -> None:
-        self.surface = surface
-
-    def __hash__(self) -> int:
-        return id(self.surface)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Rest) and other.surface is self.surface
-
-
-@lru_cache(maxsize=4)
-def _optics(
-    calibration: TactileCalibration, level: OpticsLevel, sensor: TactileSensor, rest: _Rest
-) -> Optics:
-    if rest.surface is not None or sensor.gel_radius is None:
-        return Optics(calibration, level, rest.surface)
-    return Optics(calibration, level, -rest_surface(sensor))
+    return Optics(calibration, level, None if sensor.gel_radius is None else -rest_surface(sensor))

@@ -16,15 +16,14 @@ from harness.basics.arrays import BoolArray, ByteArray, FloatArray
 from harness.basics.errors import WrongUse
 from harness.bench.scene import SceneFile
 from harness.effects import touch as effects_of_touch
-from harness.effects.accuracy import Accuracy, Level
+from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import Effect, Facts, build_catalogue, knobs_of, quantity_name
 from harness.effects.evaluate import Evaluation, evaluate
-from harness.effects.force import pressed_of_gel
 from harness.effects.plan import Plan, default_accuracy, plan
 from harness.effects.quantities import Quantities
 from harness.objectfile.file import ObjectFile
-from harness.sim.gel.contact_force import ContactForce
+from harness.sim.gel.contact_force import ContactForce, pressed_of_gel
 from harness.sim.gel.gel import require_within_gel
 from harness.sim.gel.height_file import Heights
 from harness.sim.optics.pressed_gel import Gel
@@ -116,11 +115,6 @@ class Press:
         """With how much force it is pressed; None where that was not asked for."""
         return self.evaluation.touch.force
 
-    @property
-    def levels(self) -> dict[str, Level]:
-        """Of every knob of an effect that ran."""
-        return {name: level for step in self.plan.ran for name, level in step.levels.items()}
-
 
 def press_heights(
     heights: FloatArray,
@@ -151,44 +145,41 @@ def press_heights(
         CalibrationRefused: a level that the calibration does not have.
         OutOfDomain: heights deeper than the gel is thick, or beyond the table of forces.
     """
-    if of == "object":
-        sources: Quantities = {"touch_height_map": np.maximum(heights, 0.0)[None]}
-        return _masked(_pressed(sources, of, gel, scene, levels, force), missing)
-    if reached is None and (gel.sensor.casts_shadow or gel.sensor.markers is not None):
-        raise WrongUse(
-            "the surface of a gel does not say where the object touches, and shadows and dots go by that; "
-            "give it with --reached FILE.npy, or leave them out (--no-shadow)"
-        )
-    touched = pressed_of_gel(heights) if reached is None else reached
-    sources = {"touch_height_map": np.maximum(touched, 0.0)[None], "touch_gel": heights[None]}
-    press = _pressed(sources, of, gel, scene, levels, force)
-    if reached is not None:
+    sources: Quantities = {"touch_height_map": np.maximum(heights, 0.0)[None]}
+    if of == "gel":
+        if reached is None and (gel.sensor.casts_shadow or gel.sensor.markers is not None):
+            raise WrongUse(
+                "the surface of a gel does not say where the object touches, and shadows and dots go by "
+                "that; give it with --reached FILE.npy, or leave them out (--no-shadow)"
+            )
+        touched = pressed_of_gel(heights) if reached is None else reached
+        sources = {"touch_height_map": np.maximum(touched, 0.0)[None], "touch_gel": heights[None]}
+    press = press_gel(sources, gel, scene, levels, force, of)
+    if of == "gel" and reached is not None:
         press = replace(press, contact=contact_of(reached, gel.calibration, "object"))
-    return _masked(press, missing)
-
-
-def _masked(press: Press, missing: BoolArray | None) -> Press:
     if missing is None or not missing.any():
         return press
     return replace(press, contact=press.contact & ~missing, missing=missing)
 
 
-def press_mesh(
+def press_gel(
     sources: Quantities,
     gel: Gel,
     scene: SceneFile,
     levels: Sequence[str] = (),
     force: bool = False,
+    of: Heights = "object",
 ) -> Press:
-    """Draw the press of a mesh.
+    """Draw one press of a gel.
 
     Args:
-        sources: ``object_mesh`` and ``contact_gel_from_object``, ``(1, 4, 4)``; ``contact_presses`` too where
-            the place is known.
+        sources: ``object_mesh`` and ``contact_gel_from_object``, ``(1, 4, 4)``, and ``contact_presses`` too
+            where the place is known; or quantities that take their place, such as ``touch_height_map``.
         gel: that is pressed.
         scene: says which senses and noises there are, and names an ObjectFile where touch comes from one.
         levels: as an operator writes them, ``"touch.optics=exact"``.
         force: whether to compute the force as well.
+        of: whether the press is known by the object, or by the gel alone.
 
     Raises:
         WrongUse: an unknown knob or level; no ObjectFile where one is asked, or one of another object or gel.
@@ -196,13 +187,7 @@ def press_mesh(
         CalibrationRefused: a level that the calibration does not have.
         OutOfDomain: the object reaches deeper than the gel is thick, or beyond the table of forces.
     """
-    return _pressed(sources, "object", gel, scene, levels, force)
-
-
-def _pressed(
-    given: Quantities, of: Heights, gel: Gel, scene: SceneFile, levels: Sequence[str], force: bool
-) -> Press:
-    sources: Quantities = {
+    whole: Quantities = {
         "sensor": gel.sensor,
         "sensor_calibration": gel.calibration,
         "sensor_noise": gel.noise,
@@ -210,31 +195,30 @@ def _pressed(
         "sensor_elastic": gel.elastic,
         "sensor_forces": gel.forces,
         "object_wall": scene.object.wall,
-        **given,
+        **sources,
     }
     if gel.shadow is not None:
-        sources["sensor_shadow_table"] = gel.shadow
+        whole["sensor_shadow_table"] = gel.shadow
     if gel.rest is not None:
-        sources["sensor_rest"] = gel.rest
+        whole["sensor_rest"] = gel.rest
     if gel.dots is not None:
-        sources["sensor_dots"] = gel.dots
+        whole["sensor_dots"] = gel.dots
     wanted = ["touch.image", "touch.saturated", "touch.extrapolated"]
     wanted += ["touch.shadow_out_of_table"] if gel.sensor.casts_shadow else []
     wanted += ["touch.force"] if force else []
     chosen = Accuracy.default(_KNOBS).with_texts(levels)
     accuracy = default_accuracy(PRESS_EFFECTS).with_(chosen)
-    made = plan(PRESS_EFFECTS, Facts(scene, gel.sensor), wanted, accuracy, map(quantity_name, sources))
-    used = {name for step in made.ran for name in step.levels}
+    made = plan(PRESS_EFFECTS, Facts(scene, gel.sensor), wanted, accuracy, map(quantity_name, whole))
     for text in levels:
         name = text.partition("=")[0].strip()
-        if name not in used:
+        if name not in made.levels:
             raise WrongUse(
                 f"{text}: nothing that runs here goes by {name}; leave it out (there are "
-                f"{', '.join(sorted(used))})"
+                f"{', '.join(sorted(made.levels))})"
             )
     if "object.file" in made.sources and scene.object.objectfile is not None:
-        sources["object_file"] = ObjectFile.open(Path(scene.object.objectfile))
-    done = evaluate(made, sources)
+        whole["object_file"] = ObjectFile.open(Path(scene.object.objectfile))
+    done = evaluate(made, whole)
     touch = done.touch
     for depths in (touch.height_map, touch.gel):
         if depths is not None:

@@ -13,7 +13,7 @@ from harness.basics.mesh import Mesh
 from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15, TactileSensor
 from harness.effects.quantities import Quantities
-from harness.effects.touch_press import Press, press_heights, press_mesh
+from harness.effects.touch_press import Press, press_gel, press_heights
 from harness.sim.gel.gel import R15_SKIRT, deform, skirt_for
 from harness.sim.gel.height_file import Heights, given_heights
 from harness.sim.gel.height_map import RasterMesh, height_maps
@@ -123,7 +123,7 @@ def test_a_flat_face_is_coloured_as_the_untouched_gel_in_any_pose(level: str) ->
         "object_mesh": mesh,
         "contact_gel_from_object": gel_from_object(place, 1e-3, 0.0, 0.0, 0.4)[None],
     }
-    press = press_mesh(given, PLAIN, SCENE, [f"touch.optics={level}"])
+    press = press_gel(given, PLAIN, SCENE, [f"touch.optics={level}"])
     within = slice(50, 70), slice(70, 90)
     assert press.heights[within] == pytest.approx(1e-3, abs=1e-15)
     assert np.array_equal(press.image[within], PLAIN.calibration.background[within])

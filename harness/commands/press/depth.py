@@ -318,7 +318,7 @@ def _force_json(wanted: "tuple[float, GelElastic] | None", read: "DepthReading")
     """Return the keys of the answer, as ``sim touch`` has them, and its ``notes`` and ``seconds``."""
     if wanted is None:
         return {"force_n": None, "force_uncertainty_n": None, "force": None, "notes": [], "seconds": None}
-    from harness.effects.force import read_force
+    from harness.sim.optics.depth_reading import read_force
 
     began, (thickness, elastic) = time.process_time(), wanted
     found = read_force(read, thickness, elastic)

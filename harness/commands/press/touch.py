@@ -203,7 +203,7 @@ def touch(
         from harness.basics.npz_file import write_array
 
         assert touched.press.force is not None
-        if touched.press.levels[forces.LEVEL] == "table":
+        if touched.press.plan.levels[forces.LEVEL] == "table":
             _refuse("a table of forces says how much, not where; leave --pressure-out out, or --force-table")
         write_array(pressure_out, touched.press.force.pressure[0])
     return _finish(touched, {"calibration": loaded}, out, live, picture, height_out, json)
@@ -330,7 +330,7 @@ def _press_mesh(
     """
     from harness.basics.quantities import ANGLE, LENGTH
     from harness.effects.scene_object import known_object
-    from harness.effects.touch_press import press_mesh
+    from harness.effects.touch_press import press_gel
     from harness.sim.gel.press_pose import gel_from_object
     from harness.sim.gel.presses import Presses
 
@@ -350,7 +350,7 @@ def _press_mesh(
         "contact_gel_from_object": at[None],
         "contact_presses": Presses.one(place.point, place.normal, depth, tilt, azimuth, yaw),
     }
-    press = press_mesh(sources, gel, scene, levels, force)
+    press = press_gel(sources, gel, scene, levels, force)
     asked = {"depth_m": depth, "tilt_rad": tilt, "azimuth_rad": azimuth, "yaw_rad": yaw}
     return Touched(press, mesh, place, at, asked, (*known.read, *known.warnings), seconds={"mesh": read})
 

@@ -128,7 +128,7 @@ def as_json(touched: Touched, out: Path, picture: Path | None, height_out: Path 
             "maps_measured": press.maps_measured,
         },
         "live": None if touched.live is None else _compared(touched),
-        "levels": press.levels,
+        "levels": press.plan.levels,
         "effects": plan_json(press.plan),
         "seconds": {**touched.seconds, **press.evaluation.seconds},
         "notes": touched.notes,

@@ -45,6 +45,10 @@ SETTLED = 1e-5
 _MOST_TURNS = 1000
 
 
+OF_GEL = 0.1
+"""Share of the deepest pixel from which the surface of a gel is taken to be pressed."""
+
+
 @dataclass(frozen=True, eq=False)
 class Pressure:
     """What presses where."""
@@ -176,6 +180,20 @@ class ContactForce:
             read_only(depth.max(axis=(1, 2)) / thickness),
             read_only(strains),
         )
+
+
+def pressed_of_gel(surface: FloatArray, share: float = OF_GEL) -> FloatArray:
+    """Estimate how deep a gel is pressed from its surface: the pixels deeper than a share of the deepest.
+
+    The object is where the surface is pressed, and the gel that hangs around it needs no force. A rendered
+    skirt would (``docs/explanation/touch_force.md`` states the cost of the tenth).
+
+    Args:
+        surface: ``(rows, columns)`` metres of indentation.
+        share: of the deepest pixel.
+    """
+    kept: FloatArray = np.where(surface > share * surface.max(), np.maximum(surface, 0.0), 0.0)
+    return kept
 
 
 def contact_force(

@@ -9,6 +9,8 @@ from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import DataRefused, PictureRefused
 from harness.basics.geometry import apply
 from harness.picture.square_pixels import aspect_stated, made_square
+from harness.sim.gel.contact_force import ContactForce, ForceLevel, contact_force, pressed_of_gel
+from harness.sim.gel.elastic import GelElastic
 from harness.sim.optics.check.picture_check import (
     checked_picture,
     require_one_press,
@@ -25,6 +27,10 @@ _THICKEST = 5e-3
 _SURROUNDINGS = 0.25
 """Share of the depth, one standard deviation, that surroundings of another colour may add. Real balls of
 known radius read 2.0 to 2.6 mm deep where the radius of their contact gives 1.0 to 1.6 mm."""
+
+
+_OTHER_SHARES = (0.05, 0.2)
+"""Of the deepest pixel, from which the gel might be taken to be pressed as well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,3 +173,46 @@ def _check(frames: ByteArray, background: ByteArray | None, calibration: Tactile
             f"the background is {background.shape[1]} x {background.shape[0]} pixels and the calibration's "
             f"{wanted[1]} x {wanted[0]}; give the camera's own picture, not cropped"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class ReadForce:
+    """The force of one reading."""
+
+    pressed: ContactForce  #: all but the reading's own error, of one press.
+    reading: float  #: share of the force, one standard deviation: what the reading is off by.
+    newtons: float  #: exactly 0 where nothing was seen to press.
+    uncertainty: float  #: N, one standard deviation.
+
+
+def read_force(
+    read: DepthReading, thickness: float, gel: GelElastic, level: ForceLevel = "layer"
+) -> ReadForce:
+    """The force of a press that was read.
+
+    Args:
+        read: surface and error.
+        thickness: metres of the gel.
+        gel: how stiff it is.
+        level: how it is computed; what the reading adds is computed by springs.
+
+    Raises:
+        OutOfDomain: the reading is deeper than the gel is thick.
+    """
+    surface = read.height if read.contact.any() else np.zeros_like(read.height)
+    pressed = contact_force(pressed_of_gel(surface)[None], read.pitch, thickness, gel, level)
+    newtons = float(pressed.newtons[0])
+    if newtons == 0.0:
+        return ReadForce(pressed, 0.0, 0.0, 0.0)
+
+    def springs(depth: FloatArray) -> float:
+        held = np.clip(depth, 0.0, thickness)
+        return float(contact_force(held[None], read.pitch, thickness, gel, "winkler").newtons[0])
+
+    middle = pressed_of_gel(surface)
+    here = springs(middle)
+    high, low = (springs(np.where(middle > 0.0, surface + by * read.sigma, 0.0)) for by in (1.0, -1.0))
+    by_error = (high - low) / (2.0 * here)
+    more, less = (springs(pressed_of_gel(surface, share)) for share in _OTHER_SHARES)
+    reading = float(np.hypot(by_error, (more - less) / (2.0 * here)))
+    return ReadForce(pressed, reading, newtons, float(np.hypot(pressed.uncertainty[0], newtons * reading)))

@@ -11,8 +11,7 @@ ZERO = Knob("rounds", (0, 1, 3), "", "number", 3)
 KNOBS = (GRID, OPTICS, ZERO)
 
 
-def test_finest_and_default_choose_a_level_for_every_knob() -> None:
-    assert dict(Accuracy.finest(KNOBS)) == {"touch.grid": 120, "touch.optics": "exact", "rounds": 3}
+def test_default_chooses_a_level_for_every_knob() -> None:
     assert dict(Accuracy.default(KNOBS)) == {"touch.grid": 60, "touch.optics": "fast", "rounds": 3}
 
 

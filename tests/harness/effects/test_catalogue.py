@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import inverse, transform
 from harness.basics.mesh import Mesh
@@ -15,7 +16,7 @@ from harness.bench.scene import Light, Room, SceneFile, Sensors, scene_from_opti
 from harness.bench.sensor import GELSIGHT_R15, MarkerGrid
 from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
-from harness.effects.effect import Effect, Facts, knobs_of
+from harness.effects.effect import Effect, Facts, build_catalogue, knobs_of
 from harness.effects.evaluate import evaluate
 from harness.effects.explain import as_json, as_table, left_out, scene_plan
 from harness.effects.plan import default_accuracy, plan
@@ -236,6 +237,18 @@ def test_lights_call_for_shadows_of_the_scene_camera() -> None:
 def test_without_touch_a_tactile_image_is_refused() -> None:
     with pytest.raises(WrongUse, match=r"touch\.image .*sensors\.touch is false"):
         scene_plan(with_sensors(touch=False), GELSIGHT_R15)
+
+
+def measure_brightness(touch_image: ByteArray) -> FloatArray:
+    return np.asarray(touch_image.mean(axis=(1, 2, 3)))
+
+
+def test_a_toy_effect_is_a_function_and_a_row(mug: Mesh, calibration: TactileCalibration) -> None:
+    effects = build_catalogue(*EFFECTS, Effect("toy.brightness", measure_brightness))
+    made = plan(effects, Facts(SCENE, GELSIGHT_R15), ["toy.brightness"], default_accuracy(effects))
+    assert as_json(made)["ran"][-1] == {"effect": "toy.brightness", "reason": "it is asked for", "levels": {}}
+    done = evaluate(made, sources(mug, calibration, 1e-3))
+    assert done["toy.brightness"] == pytest.approx([done.values["touch_image"].mean()])
 
 
 def test_knobs_are_unique() -> None:

@@ -16,7 +16,7 @@ from harness.basics.store import Store
 from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
 from harness.effects.accuracy import Accuracy, Knob, Level
-from harness.effects.effect import Condition, Effect, Facts, Implementation, build_catalogue, knobs_of
+from harness.effects.effect import Condition, Effect, Facts, build_catalogue, knobs_of
 from harness.effects.evaluate import Evaluation, evaluate
 from harness.effects.plan import Plan, default_accuracy, plan
 from harness.effects.quantities import Quantities
@@ -253,14 +253,37 @@ def test_a_knob_downstream_does_not_disturb_what_is_stored_upstream(tmp_path: Pa
         assert ("a" in done.calls) == (level == 1)
 
 
+def test_a_supplied_quantity_takes_the_place_of_its_effect(tmp_path: Path) -> None:
+    effects, store = stored(chain(add_one, NEVER), "c"), Store(tmp_path)
+    made = plan(effects, FACTS, ["c"], default_accuracy(effects), ["b"])
+    assert ([step.effect.provides for step in made.ran], made.sources) == (["c"], ("b",))
+    assert [step.effect.provides for step in made.skipped] == ["a", "d"]
+    for b, times in ((5.0, 1), (5.0, 0), (6.0, 1)):
+        done = evaluate(made, Toy(b=np.full(1, b)), store)
+        assert (value(done, "c").item(), done.calls.get("c", 0)) == (b + 1.0, times)
+    unplanned = evaluate(
+        plan(chain(add_one), FACTS, ["c"], default_accuracy(effects)), Toy(x=1.0, b=np.array(5.0))
+    )
+    assert (float(value(unplanned, "c")), dict(unplanned.calls)) == (6.0, {"c": 1})
+
+
+def test_a_parameter_with_a_default_is_a_source_that_may_be_left_out() -> None:
+    effects = (Effect("a", lambda x, y=10.0: x + y),)
+    without = plan(effects, FACTS, ["a"], default_accuracy(effects))
+    made = plan(effects, FACTS, ["a"], default_accuracy(effects), ["x", "y"])
+    assert (without.sources, made.sources) == (("x",), ("x", "y"))
+    assert value(evaluate(without, Toy(x=1.0)), "a") == 11.0
+    assert value(evaluate(made, Toy(x=1.0, y=2.0)), "a") == 3.0
+
+
 HOW = Knob("how", ("guess", "table", "exact"), "", "method", "exact")
 
 
 def with_ways(guess: Condition | None = ALWAYS, version: int = 1) -> tuple[Effect, ...]:
     """``a`` of ``x``; or guessed, of ``y``; or out of a table, of both; and ``b`` of ``a``."""
-    ways: dict[Level, Implementation] = {
-        "guess": Implementation(lambda y: -y, when=guess),
-        "table": Implementation(lambda x, y, *, b: x * b, knobs=(FACTOR,), version=version),
+    ways: dict[Level, Effect] = {
+        "guess": Effect("a", lambda y: -y, when=guess),
+        "table": Effect("a", lambda x, y, *, b: x * b, knobs=(FACTOR,), version=version),
     }
     return (
         Effect("a", lambda x: x, choice=HOW, ways=ways),
@@ -312,6 +335,6 @@ def test_ways_are_told_apart_in_the_store_and_a_new_one_drops_nothing(tmp_path: 
 
 
 def test_a_way_of_no_level_is_refused() -> None:
-    astray = replace(with_ways()[0], ways={"gues": Implementation(lambda: 0.0)})
+    astray = replace(with_ways()[0], ways={"gues": Effect("a", lambda: 0.0)})
     with pytest.raises(ValueError, match=r"\ba\b.*\("):
         build_catalogue(astray)

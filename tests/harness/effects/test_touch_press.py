@@ -14,7 +14,7 @@ from harness.bench.sensor import GELSIGHT_R15, MarkerGrid, described_sensor
 from harness.effects.evaluate import evaluate
 from harness.effects.explain import scene_plan
 from harness.effects.quantities import Quantities
-from harness.effects.touch_press import press_heights, press_mesh
+from harness.effects.touch_press import press_gel, press_heights
 from harness.objects.household import build
 from harness.sim.gel.gel import deform
 from harness.sim.gel.height_file import Heights
@@ -51,7 +51,7 @@ def pressed_mug() -> Quantities:
 def test_a_mesh_is_drawn_as_the_catalogue_draws_it(pressed_mug: Quantities) -> None:
     given: Quantities = {**pressed_mug, "sensor": BENCH.sensor, "sensor_calibration": BENCH.calibration}
     directly = evaluate(scene_plan(SCENE, GELSIGHT_R15), given)
-    press = press_mesh(pressed_mug, BENCH, SCENE)
+    press = press_gel(pressed_mug, BENCH, SCENE)
     assert np.array_equal(press.image, directly.values["touch_image"][0])
     assert np.array_equal(press.heights, directly.values["touch_height_map"][0])
     assert press.deepest == directly.values["touch_height_map"].max()
@@ -59,7 +59,7 @@ def test_a_mesh_is_drawn_as_the_catalogue_draws_it(pressed_mug: Quantities) -> N
 
 
 def test_the_height_map_of_a_mesh_is_drawn_as_the_mesh(pressed_mug: Quantities) -> None:
-    press = press_mesh(pressed_mug, BENCH, SCENE)
+    press = press_gel(pressed_mug, BENCH, SCENE)
     again = press_heights(press.heights, "object", BENCH, SCENE)
     assert np.array_equal(again.image, press.image)
     given_gel = press_heights(press.surface, "gel", BENCH, SCENE)
@@ -67,7 +67,7 @@ def test_the_height_map_of_a_mesh_is_drawn_as_the_mesh(pressed_mug: Quantities) 
 
 
 def test_only_what_the_sensor_calls_for_is_computed(pressed_mug: Quantities) -> None:
-    ran = {step.effect.provides for step in press_mesh(pressed_mug, BENCH, SCENE).plan.ran}
+    ran = {step.effect.provides for step in press_gel(pressed_mug, BENCH, SCENE).plan.ran}
     own = {"touch.drawn", "touch.colour", "touch.saturated", "touch.extrapolated", "touch.image"}
     assert ran == {"object.raster", "touch.height_map", "touch.gel"} | own
     given = press_heights(bump(1e-3), "object", BENCH, SCENE)
@@ -102,13 +102,13 @@ def test_a_press_on_a_measured_dome_is_one_on_the_sensors_own() -> None:
     y, x = np.mgrid[:120, :160] - np.array([59.5, 79.5])[:, None, None]
     rest = -np.sqrt(28.43e-3**2 - (x * x + y * y) * GELSIGHT_R15.pitch**2)
     given = mug_press(0.8e-3)
-    own = press_mesh(given, replace(BENCH, sensor=domed), SCENE)
-    measured = press_mesh(given, replace(BENCH, rest=rest), SCENE)
+    own = press_gel(given, replace(BENCH, sensor=domed), SCENE)
+    measured = press_gel(given, replace(BENCH, rest=rest), SCENE)
     # A measured surface has no apex between its four middle pixels: it starts 0.1 um lower.
     assert measured.heights == pytest.approx(own.heights, abs=2.5e-7)
     apart = np.abs(measured.image.astype(int) - own.image)
     assert (apart.max(axis=-1) > 1).mean() < 0.03  # slopes that lie at a bin's edge
-    fine = press_mesh(given, replace(BENCH, rest=rest), SCENE, ["touch.supersampling=2"])
+    fine = press_gel(given, replace(BENCH, rest=rest), SCENE, ["touch.supersampling=2"])
     assert np.abs(fine.heights - measured.heights).max() < 30e-6
 
 
@@ -145,7 +145,7 @@ def test_a_part_that_is_where_the_sensor_would_be_is_refused() -> None:
     at = transform(inwards, np.array([0.0, 0.0, 0.05]))
     given: Quantities = {"object_mesh": mug, "contact_gel_from_object": inverse(at[None])}
     with pytest.raises(OutOfDomain, match=r" mm.*2\.5 mm"):
-        press_mesh(given, BENCH, SCENE)
+        press_gel(given, BENCH, SCENE)
 
 
 def test_flags_say_what_the_picture_cannot_show() -> None:
@@ -195,7 +195,7 @@ def test_noise_runs_only_where_it_is_asked_for_and_is_the_seeds() -> None:
 
 def test_levels_are_turned_or_refused() -> None:
     press = press_heights(bump(1e-3), "object", BENCH, SCENE, ["touch.optics=smooth", "touch.gel=fast"])
-    assert press.levels == {"touch.shapes": "reference", "touch.optics": "smooth", "touch.gel": "fast"}
+    assert press.plan.levels == {"touch.shapes": "reference", "touch.optics": "smooth", "touch.gel": "fast"}
     for level, words in (
         ("touch.optics=exat", "'exat'.*'exact'"),
         ("touch.lens=1", "no knob"),

@@ -176,15 +176,15 @@ from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.gel.press_pose import contact_place, gel_from_object
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from harness.sim.optics.pressed_gel import Gel
-from harness.effects.touch_press import press_mesh
+from harness.effects.touch_press import press_gel
 TOUCH = {"harness.objectfile.touch.touch", "harness.objectfile.touch.level", "onnx", "onnxruntime"}
 mesh = ObjectFile.open(Path(sys.argv[1])).mesh
 at = gel_from_object(contact_place(mesh, np.array([0.01, 0.02, 0.05])), 1e-3, 0.0, 0.0, 0.0)
 scene = scene_from_options("builtin:mug", objectfile=sys.argv[1])
 gel = Gel(GELSIGHT_R15, shipped_calibration("gelsight_r15_bench"))
-press_mesh({"object_mesh": mesh, "contact_gel_from_object": at[None]}, gel, scene)
+press_gel({"object_mesh": mesh, "contact_gel_from_object": at[None]}, gel, scene)
 print(sorted(TOUCH & sys.modules.keys()))
-press_mesh({"object_mesh": mesh, "contact_gel_from_object": at[None]}, gel, scene, ["touch.shapes=network"])
+press_gel({"object_mesh": mesh, "contact_gel_from_object": at[None]}, gel, scene, ["touch.shapes=network"])
 print("harness.objectfile.touch.touch" in sys.modules)
 """
 

@@ -13,7 +13,7 @@ from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.mesh import Mesh
 from harness.effects.accuracy import Knob
 from harness.effects.catalogue import EFFECTS
-from harness.effects.effect import Effect, Implementation, build_catalogue
+from harness.effects.effect import Effect, build_catalogue
 from tests.harness.effects.wiring import WIRED, current, wiring
 
 ROOT = Path(__file__).parents[3]
@@ -77,7 +77,7 @@ def of_nothing(touch_imgae: ByteArray) -> FloatArray:
     raise NotImplementedError
 
 
-def at_a_level(touch_image: ByteArray, *, toy_sides: str) -> FloatArray:
+def at_a_level(touch_image: ByteArray, *, toy_sides: int) -> FloatArray:
     raise NotImplementedError
 
 
@@ -98,12 +98,11 @@ def of_the_toy(toy_brightness: ByteArray) -> ByteArray:
         ),
         (Effect("toy.brightness", of_nothing), r"toy\.brightness .*touch\.imgae"),
         (Effect("touch.image", right), r"touch\.image .*returns .*float64.*uint8"),
-        (Effect("toy.brightness", at_a_level, knobs=(SIDES,)), r"toy_sides is str.*\(1, 2\)"),
-        (Effect("toy.brightness", at_a_level), r"toy\.brightness .*toy_sides"),
-        (Effect("toy.brightness", unstated, knobs=(SIDES,)), r"toy\.brightness .*toy_sides"),
-        (Effect("toy.brightness", right, knobs=(SIDES,)), r"toy\.brightness .*toy_sides"),
+        (Effect("toy.brightness", at_a_level), r"toy\.brightness .*toy\.sides"),
+        (Effect("toy.brightness", unstated, knobs=(SIDES,)), r"toy\.brightness .*toy\.sides"),
+        (Effect("toy.brightness", right, knobs=(SIDES,)), r"toy\.brightness .*toy\.sides"),
         (
-            Effect("toy.brightness", right, choice=SIDES, ways={2: Implementation(of_a_mesh)}),
+            Effect("toy.brightness", right, choice=SIDES, ways={2: Effect("toy.brightness", of_a_mesh)}),
             r"toy\.brightness \(of_a_mesh\).*Mesh",
         ),
     ],
@@ -133,4 +132,4 @@ def test_no_signature_of_the_effects_has_any() -> None:
                 stated = [node.annotation]
             for each in stated:
                 text = "" if each is None else ast.unparse(each)
-                assert "Any" not in text.replace("AnyArray", ""), f"{path.name}:{node.lineno}: {text}"
+                assert "Any" not in text.replace("AnyArray", ""), f"{path.name}: {text}"

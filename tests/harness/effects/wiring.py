@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from harness.effects.catalogue import EFFECTS
-from harness.effects.effect import Effect, Implementation, parameter_name, quantity_name
+from harness.effects.effect import Effect, parameter_name, quantity_name
 from harness.effects.quantities import Quantities
 from harness.effects.touch_press import PRESS_EFFECTS
 
@@ -24,7 +24,6 @@ def wiring(effects: Iterable[Effect], quantities: type = Quantities) -> str:
     for effect in effects:
         target = f'computed["{parameter_name(effect.provides)}"]'
         for way in (effect, *effect.ways.values()):
-            assert isinstance(way, Effect | Implementation)
             modules.add(way.compute.__module__)
             name = f"{way.compute.__module__}.{way.compute.__qualname__}"
             lines[f"{target} = {name}({', '.join(_arguments(way))})"] = None
@@ -45,7 +44,7 @@ def wiring(effects: Iterable[Effect], quantities: type = Quantities) -> str:
     ])  # fmt: skip
 
 
-def _arguments(way: Effect | Implementation) -> list[str]:
+def _arguments(way: Effect) -> list[str]:
     """Quantities by their parameters, and levels by the knobs of the function's module."""
     found = []
     for each in inspect.signature(way.compute).parameters.values():

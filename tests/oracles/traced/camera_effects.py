@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from harness.effects.accuracy import Knob
 from harness.effects.catalogue import EFFECTS
-from harness.effects.effect import Effect, Implementation
+from harness.effects.effect import Effect
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import Appearance
 from tests.oracles.traced.path_traced import PathTraced, TracedImage
@@ -32,7 +32,7 @@ def trace_paths(
     return object_traced.render(camera, camera_lights, camera_paths, True, camera_bounces)
 
 
-PATHS_WAY = Implementation(trace_paths, knobs=(PATHS, BOUNCES))
+PATHS_WAY = Effect("camera.image", trace_paths, knobs=(PATHS, BOUNCES))
 
 TRACED_EFFECTS = (
     *(

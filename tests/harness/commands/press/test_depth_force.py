@@ -12,12 +12,11 @@ from harness.basics.errors import OutOfDomain
 from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
 from harness.cli import invoke
-from harness.effects.force import read_force
 from harness.effects.touch_press import press_heights
 from harness.picture.image_file import write_png
 from harness.sim.gel.contact_force import contact_force
 from harness.sim.gel.elastic import GelElastic
-from harness.sim.optics.depth_reading import DepthReading, read_press
+from harness.sim.optics.depth_reading import DepthReading, read_force, read_press
 from harness.sim.optics.inverse import DRIFTING
 from harness.sim.optics.pressed_gel import Gel
 from harness.sim.optics.tactile_calibration import shipped_calibration

@@ -12,7 +12,7 @@ from harness.basics.errors import CalibrationRefused, OutOfDomain, WrongUse
 from harness.basics.files.json_file import write_model
 from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
-from harness.effects.force import pressed_of_gel, table_force
+from harness.effects.force import look_up_force
 from harness.effects.touch_press import press_heights
 from harness.sim.gel import contact_force as forces
 from harness.sim.gel.elastic import GelElastic
@@ -76,8 +76,8 @@ def test_a_force_that_is_asked_for_is_computed_once_and_changes_no_picture(
     # Twice: on squares twice as large as well, to say what squares cost.
     assert solved == [level, level]
     assert press.evaluation.calls["touch.force"] == 1
-    assert press.levels["touch.force"] == level
-    assert ("touch.force_cells" in press.levels) == (level == "layer")
+    assert press.plan.levels["touch.force"] == level
+    assert ("touch.force_cells" in press.plan.levels) == (level == "layer")
     assert np.array_equal(press.image, press_heights(_ball(0.5e-3), "object", BENCH, SCENE).image)
     wanted = forces.contact_force(_ball(0.5e-3)[None], PITCH, THICK, BENCH.elastic, level)  # type: ignore[arg-type]
     assert press.force is not None
@@ -101,7 +101,7 @@ def test_the_surface_of_a_gel_asks_for_the_force_of_what_it_is_a_surface_of() ->
         assert whole.force is not None
         assert again.force is not None
         assert again.force.newtons == pytest.approx(whole.force.newtons, rel=0.1)
-    assert pressed_of_gel(np.array([[-1.0, 0.05, 0.2, 1.0]])).tolist() == [[0.0, 0.0, 0.2, 1.0]]
+    assert forces.pressed_of_gel(np.array([[-1.0, 0.05, 0.2, 1.0]])).tolist() == [[0.0, 0.0, 0.2, 1.0]]
 
 
 def test_measured_forces_pass_their_rows_rise_between_them_and_carry_their_scatter() -> None:
@@ -111,7 +111,7 @@ def test_measured_forces_pass_their_rows_rise_between_them_and_carry_their_scatt
     between = [table.at(depth)[0] for depth in np.linspace(0.0, 0.8e-3, 200)]
     assert between[0] == 0.0
     assert (np.diff(between) > 0.0).all()
-    found = table_force(_ball(0.4e-3)[None], PITCH, THICK, table)
+    found = look_up_force(_ball(0.4e-3)[None], GELSIGHT_R15, table)
     deepest = _ball(0.4e-3).max()
     assert (found.newtons[0], found.uncertainty[0]) == pytest.approx(table.at(deepest))
     assert found.centre[0] == pytest.approx([0.0, 0.0], abs=1e-9)
@@ -124,7 +124,7 @@ def test_a_table_by_volume_goes_by_the_volume_that_the_object_takes() -> None:
     table = ForceTable.model_validate({**TABLE, "of": "volume_m3", "rows": rows})
     depth = _ball(0.5e-3)
     assert table.measure(depth, PITCH) == pytest.approx(np.pi * 5e-3 * 0.5e-3**2, rel=1e-3)
-    assert table_force(depth[None], PITCH, THICK, table).newtons == pytest.approx(
+    assert look_up_force(depth[None], GELSIGHT_R15, table).newtons == pytest.approx(
         table.at(float(depth.sum()) * PITCH**2)[0]
     )
 
