@@ -76,8 +76,10 @@ contracts: $(DEV)
 data: $(DEV) ## the public data of the tests (75 MB, once), to TOUCHSTONE_DATA or the user's cache
 	@$(BIN)/python -m tests.support.fetch_data
 
-reference: $(DEV) ## docs/reference, from the models and the tables
+reference: $(DEV) ## docs/reference and the calls of all effects, from the models and the tables
 	@$(BIN)/python -m tests.docs.reference
+	@$(BIN)/python -m tests.harness.effects.wiring
+	@$(BIN)/ruff format -q tests/harness/effects/wired.py
 
 results: $(DEV) ## docs/results, from the JSON in docs/results/data
 	@$(BIN)/python -m tests.docs.results
