@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.bench.scene import scene_from_options
 from harness.effects.scene_object import known_object
-from harness.effects.touch_press import Press, press_mesh
+from harness.effects.touch_press import Press, press_gel
 from harness.objects.builtin import BUILTIN
 from harness.sim.gel.press_pose import contact_place, gel_from_object
 from harness.sim.optics.known_gel import known_gel
@@ -47,4 +47,4 @@ def tactile_image(
     gel, known = known_gel(sensor, calibration), known_object(scene)
     place = contact_place(known.mesh, np.asarray(contact, dtype=np.float64))
     pose = gel_from_object(place, depth, tilt, 0.0, 0.0, gel.sensor.gel_thickness)
-    return press_mesh({"object.mesh": known.mesh, "contact.gel_from_object": pose[None]}, gel, scene)
+    return press_gel({"object_mesh": known.mesh, "contact_gel_from_object": pose[None]}, gel, scene)
