@@ -15,7 +15,6 @@ from experiments.contact_localization.section import Localization
 from harness.basics.errors import DataRefused
 from harness.bench.scene import scene_from_options
 from harness.bench.station_file import load_station, station_path
-from harness.effects import sound as sound_effects
 from harness.effects.accuracy import Accuracy
 from harness.experiment.compare import compare
 from harness.experiment.experiment import Scored
@@ -55,7 +54,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return rasterise(*given)
 
     monkeypatch.setattr(height_map, "rasterise", counted)
-    monkeypatch.setattr(sound_effects, "modes_of", lambda *_: calls.append("solved"))
+    monkeypatch.setattr("harness.effects.sound.modes_of", lambda *_: calls.append("solved"))
     return calls
 
 

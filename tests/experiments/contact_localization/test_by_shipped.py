@@ -13,7 +13,6 @@ from experiments.contact_localization.section import Localization
 from harness.basics.errors import WrongUse
 from harness.bench.scene import Light, SceneFile, Sensors, scene_from_options
 from harness.bench.station_file import load_station, station_path
-from harness.effects import camera_effects, sound_effects
 from harness.effects.scene_object import known_object
 from harness.experiment.begin import begin
 from harness.experiment.compare import compare
@@ -56,8 +55,8 @@ def simulated(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return rasterise(*given)
 
     monkeypatch.setattr(height_map, "rasterise", counted)
-    monkeypatch.setattr(sound_effects, "modes_of", lambda *_: calls.append("solved"))
-    monkeypatch.setattr(camera_effects, "LitObject", lambda *_: calls.append("traced"))
+    monkeypatch.setattr("harness.effects.sound.modes_of", lambda *_: calls.append("solved"))
+    monkeypatch.setattr("harness.effects.camera.LitObject", lambda *_: calls.append("traced"))
     return calls
 
 

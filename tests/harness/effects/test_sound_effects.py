@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
+from harness.basics.arrays import AnyArray
 from harness.basics.errors import WrongUse
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
@@ -93,3 +94,19 @@ def test_modes_come_from_the_store_the_second_time(sources: Quantities, store: S
     modes = from_arrays(again.values["object_modes"])
     assert modes.rigid == 6
     assert modes.frequencies[0] > 1000.0
+
+
+def test_modes_that_earlier_versions_stored_are_found(monkeypatch: pytest.MonkeyPatch, store: Store) -> None:
+    """The key of these modes at version 4; what changes it makes every user solve all modes again."""
+    keys: list[str] = []
+
+    def get(_store: Store, key: str) -> AnyArray:
+        keys.append(key)
+        return np.zeros(1)
+
+    monkeypatch.setattr(Store, "get", get)
+    corners, faces = 0.1 * np.eye(4, 3), np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    chosen = plan(EFFECTS, Facts(HEARD, GELSIGHT_R15), ["object.modes"], default_accuracy(EFFECTS))
+    solid, plastic = Mesh(corners, faces), MATERIALS["plastic"]
+    evaluate(chosen, {"object_mesh": solid, "object_wall": None, "object_material": plastic}, store)
+    assert keys == ["4c845a574b5944e05a86af1b5694818d1c9c35a77f987c504f498c3dee6c31fd"]

@@ -23,9 +23,9 @@ from harness.bench.scene import SceneFile, Sensors, scene_from_options
 from harness.bench.station_file import load_station, station_path
 from harness.commands.scenes import SceneOptions, resolve
 from harness.cost.curve import Point, Sample
-from harness.effects import sound as sound_effects
 from harness.effects.accuracy import Accuracy, Level
 from harness.effects.scene_object import known_object
+from harness.effects.sound import SHAPES as SOUND
 from harness.effects.touch import SHAPES as TOUCH
 from harness.experiment import object_modes
 from harness.experiment.front import Front
@@ -56,7 +56,7 @@ def _nothing_is_solved(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def never(*_given: Any) -> Any:
         raise AssertionError("solved")
 
-    monkeypatch.setattr(sound_effects, "modes_of", never)
+    monkeypatch.setattr("harness.effects.sound.modes_of", never)
     monkeypatch.setenv("TOUCHSTONE_CACHE", str(tmp_path / "cache"))
 
 
@@ -120,7 +120,7 @@ def test_settings_with_networks_are_measured_beside_those_without(
     """The simulation is named where networks are the default, and so measured; nothing is measured twice."""
 
     def takes_networks(setting: Mapping[str, Level]) -> bool:
-        dials = (sound_effects.SHAPES, TOUCH)
+        dials = (SOUND, TOUCH)
         return any(setting.get(dial.name, dial.default) != dial.default for dial in dials)
 
     without, beside = settings(sound=sound), settings(sound=sound, networks=networks)

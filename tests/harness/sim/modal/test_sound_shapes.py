@@ -21,7 +21,6 @@ from harness.basics.mesh import Mesh
 from harness.basics.store import Store
 from harness.bench.scene import SceneFile, Sensors, scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
-from harness.effects import sound as sound_effects
 from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import Effect, Facts, knobs_of
@@ -151,7 +150,7 @@ def test_nothing_is_meshed_or_solved_but_for_the_elements(
     def never(*_given: Any, **_named: Any) -> Any:
         raise AssertionError("meshed or solved")
 
-    monkeypatch.setattr(sound_effects, "modes_of", found)
+    monkeypatch.setattr("harness.effects.sound.modes_of", found)
     monkeypatch.setattr(modal, "filled", never)
     monkeypatch.setattr(modal, "solve_mesh", never)
     modes_at(of, level)
