@@ -5,14 +5,11 @@ fills a mug and prints medians with their extremes: process time of one thread, 
 the count of eigenvalues below a shift, which both must give alike.
 """
 
-import argparse
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 from scipy.sparse.linalg import SuperLU, splu
 from threadpoolctl import threadpool_limits
 
@@ -21,6 +18,7 @@ from harness.sim.factor.elimination import elimination
 from harness.sim.factor.factorisation import Factor, SparseColumns, factorised, inertia
 from harness.sim.modal.solve import Elasticity
 from harness.sim.modal.system import ModalSystem, modal_system
+from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.samples.sized_mug import mug
 
 RIGHT_SIDES = 8
@@ -77,7 +75,7 @@ def rows(system: ModalSystem, times: int) -> list[tuple[str, str, str]]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("--unknowns", type=int, default=30_000)
     parser.add_argument("--repeats", type=int, default=3)
     asked = parser.parse_args()
@@ -85,12 +83,9 @@ def main() -> None:
     uniform = Elasticity.uniform(MATERIALS["ceramic"], len(mesh.cells))
     system = modal_system(mesh, uniform.lame, uniform.density)
     with threadpool_limits(limits=1):
-        table = Table(title=f"mug, {3 * len(mesh.nodes)} unknowns: CPU s, median (extremes)")
-        for heading in ("stage", "ours", "SuperLU"):
-            table.add_column(heading)
-        for row in rows(system, asked.repeats):
-            table.add_row(*row)
-    Console(width=110).print(table)
+        stages = rows(system, asked.repeats)
+    heads = f"stage, mug, {3 * len(mesh.nodes)} unknowns; ours [CPU s] .3f; SuperLU [CPU s] .3f"
+    finish_figure("modes", "factorisation", heads, stages)
 
 
 if __name__ == "__main__":

@@ -5,12 +5,9 @@ spread on the clock and of process time, on one core, and the error of each agai
 precision.
 """
 
-import argparse
 from collections.abc import Callable
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 from threadpoolctl import threadpool_limits
 
 from harness.basics.arrays import FloatArray
@@ -18,6 +15,7 @@ from harness.basics.materials import material
 from harness.sim.sound.contact_pulse import Hammer, hertz_pulse, struck
 from harness.sim.sound.modal_sound import ring
 from harness.sim.sound.synthesis import synthesize
+from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.oracles.summed_modes import COUNTS, DURATION, RATE, RATES, Case, case, error, outer, said, timed
 
 SLOW_REPEATS = 2
@@ -59,19 +57,19 @@ def rows(one: Case, repeats: int) -> list[list[str]]:
 
 def main() -> None:
     """Measure what the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("modes", type=int, nargs="*", default=COUNTS)
     parser.add_argument("--repeats", type=int, default=30)
     asked = parser.parse_args()
-    table = Table(title=f"{DURATION:g} s at {RATE / 1e3:g} kHz, one core: median (least to greatest)")
-    for heading in ("modes", "way", "ms on the clock", "ms of process time", "error dB", "stated dB"):
-        table.add_column(heading)
     with threadpool_limits(limits=1):
-        for modes in asked.modes:
-            for of in ("ceramic", "steel", *RATES):
-                for row in rows(case(modes, of), asked.repeats)[: None if of == "ceramic" else 2]:
-                    table.add_row(*row)
-    Console(width=150).print(table)
+        every = [
+            row
+            for modes in asked.modes
+            for of in ("ceramic", "steel", *RATES)
+            for row in rows(case(modes, of), asked.repeats)[: None if of == "ceramic" else 2]
+        ]
+    heads = f"modes, {DURATION:g} s at {RATE / 1e3:g} kHz; method; wall time [ms]; CPU time [ms]"
+    finish_figure("audionet", "sum of modes", f"{heads}; error [dB]; stated error [dB]", every)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ import argparse
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from calibration.taxim import light_fit
 from calibration.taxim.held_out import FOLDS, WITHIN, decibels, teach
@@ -17,6 +16,8 @@ from calibration.taxim.pictures import PressPack
 from calibration.taxim.smooth_fit import changes, distance
 from harness.basics.arrays import FloatArray
 from harness.sim.optics import lit_calibration
+from tests.benchmarks.results import benchmark_parser, finish_figure
+from tests.docs.results import Cell
 from tests.samples.ball_depth import usable
 from tests.samples.real_press import FOTS, R15, set_of
 from tests.support.real_data import WHY_NOT, find_shared_data
@@ -43,15 +44,14 @@ def main() -> None:
         change = changes(pack)
         model = teach(pack, change, who.ball)
         CONSOLE.print(_by_radius(pack, change - model.rest, model.fit.centres, model.light.edge))
-        table = Table(title=f"{word}: medians over {len(change)} presses held out, dB", title_justify="left")
-        for heading in ("the light's terms in the normal", "contact", "full frame"):
-            table.add_column(heading, justify="left" if heading.startswith("the") else "right")
+        rows: list[tuple[Cell, ...]] = []
         for degree, words in enumerate(("none", "constant", "linear", "quadratic"), start=-1):
             powers = tuple((a, b) for a in range(degree + 1) for b in range(degree + 1 - a))
             lit_calibration.LIGHT_POWERS = powers
             scores = _scores(pack, change - model.rest, model.fit.centres, model.light, who.ball)
-            table.add_row(words, *(f"{value:.2f}" for value in np.median(scores, axis=0)))
-        CONSOLE.print(table)
+            rows.append((words, *map(float, np.median(scores, axis=0))))
+        heads = f"terms in the normal, {word}, {len(change)} presses; contact [dB] .2f; full frame [dB] .2f"
+        finish_figure("touch_pictures", f"terms of the light, {word}", heads, rows)
 
 
 def _by_radius(pack: PressPack, clean: FloatArray, centres: FloatArray, edge: float) -> str:
@@ -83,7 +83,7 @@ def _scores(
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__)
     parser.add_argument("what", nargs="*", default="all", choices=["all", "r15", "fots"])
     return parser.parse_args()
 
