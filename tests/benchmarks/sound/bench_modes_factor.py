@@ -85,7 +85,7 @@ def main() -> None:
     with threadpool_limits(limits=1):
         stages = rows(system, asked.repeats)
     heads = f"stage, mug, {3 * len(mesh.nodes)} unknowns; ours [CPU s] .3f; SuperLU [CPU s] .3f"
-    finish_figure("modes", "factorisation", heads, stages)
+    finish_figure("modes", "time of factorisation", heads, stages)
 
 
 if __name__ == "__main__":
