@@ -11,33 +11,56 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from harness.tasks.audio import RenderedAudio, render_audio
     from harness.tasks.modes import modes
+    from harness.tasks.objects import (
+        AudioBuild,
+        TouchBuild,
+        VerifiedObject,
+        VisionBuild,
+        build_objectfile,
+        load_object,
+        verify_object,
+    )
     from harness.tasks.runs import answer
     from harness.tasks.touch import tactile_image
     from harness.tasks.vision import ComparedVision, RenderedVision, compare_vision, render_vision
 
 _HOMES = {
+    "AudioBuild": "harness.tasks.objects",
     "ComparedVision": "harness.tasks.vision",
     "RenderedAudio": "harness.tasks.audio",
     "RenderedVision": "harness.tasks.vision",
+    "TouchBuild": "harness.tasks.objects",
+    "VerifiedObject": "harness.tasks.objects",
+    "VisionBuild": "harness.tasks.objects",
     "answer": "harness.tasks.runs",
+    "build_objectfile": "harness.tasks.objects",
     "compare_vision": "harness.tasks.vision",
+    "load_object": "harness.tasks.objects",
     "modes": "harness.tasks.modes",
     "render_audio": "harness.tasks.audio",
     "render_vision": "harness.tasks.vision",
     "tactile_image": "harness.tasks.touch",
+    "verify_object": "harness.tasks.objects",
 }
 """Name to the module that defines it."""
 
 __all__ = [
+    "AudioBuild",
     "ComparedVision",
     "RenderedAudio",
     "RenderedVision",
+    "TouchBuild",
+    "VerifiedObject",
+    "VisionBuild",
     "answer",
+    "build_objectfile",
     "compare_vision",
+    "load_object",
     "modes",
     "render_audio",
     "render_vision",
     "tactile_image",
+    "verify_object",
 ]
 
 

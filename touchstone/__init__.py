@@ -9,27 +9,41 @@ from harness import api
 
 if TYPE_CHECKING:
     from harness.api import (
+        AudioBuild,
         ComparedVision,
         RenderedAudio,
         RenderedVision,
+        TouchBuild,
+        VerifiedObject,
+        VisionBuild,
         answer,
+        build_objectfile,
         compare_vision,
+        load_object,
         modes,
         render_audio,
         render_vision,
         tactile_image,
+        verify_object,
     )
 
 __all__ = [
+    "AudioBuild",
     "ComparedVision",
     "RenderedAudio",
     "RenderedVision",
+    "TouchBuild",
+    "VerifiedObject",
+    "VisionBuild",
     "answer",
+    "build_objectfile",
     "compare_vision",
+    "load_object",
     "modes",
     "render_audio",
     "render_vision",
     "tactile_image",
+    "verify_object",
 ]
 
 

@@ -62,10 +62,44 @@ def text_columns(result: Result) -> dict[str, list[str]]:
     }
 
 
+Leaves = Iterator[tuple[tuple[str, ...], Mapping[str, Any]]]
+"""The innermost mappings of nested ones, each with its path of keys."""
+
+
+def text_tables(result: Result) -> Iterator[tuple[str, list[str], list[list[str]]]]:
+    """Yield title, headings and rows of every field that maps names to mappings, such as errors by method."""
+    for name, value in _shown(result):
+        if _is_table(value):
+            leaves = list(_leaves(value, ()))
+            keys = list(dict.fromkeys(key for _, leaf in leaves for key in leaf))
+            rows = [
+                [
+                    " ".join(path).replace("_", " "),
+                    *(_text("", leaf[key]) if key in leaf else "" for key in keys),
+                ]
+                for path, leaf in leaves
+            ]
+            yield heading(name)[0], ["", *(key.replace("_", " ") for key in keys)], rows
+
+
+def _is_table(value: object) -> bool:
+    return isinstance(value, Mapping) and any(isinstance(item, Mapping) for item in value.values())
+
+
+def _leaves(
+    value: Mapping[str, Any], path: tuple[str, ...]
+) -> Iterator[tuple[tuple[str, ...], Mapping[str, Any]]]:
+    if not _is_table(value):
+        yield path, value
+        return
+    for key, item in value.items():
+        yield from _leaves(item, (*path, key))
+
+
 def text_rows(result: Result) -> Iterator[tuple[str, str]]:
     """Yield label and value of every other field that text shows."""
     for name, value in _shown(result):
-        if value is not None and not isinstance(value, np.ndarray):
+        if value is not None and not isinstance(value, np.ndarray) and not _is_table(value):
             yield heading(name)[0], _text(name, value)
 
 

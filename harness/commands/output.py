@@ -60,7 +60,7 @@ def print_result(result: "Result", as_json: bool) -> None:
 
     Text is the answer in words, a table of the vectors, and every other field with its unit.
     """
-    from harness.basics.result import text_columns, text_rows
+    from harness.basics.result import text_columns, text_rows, text_tables
 
     notes: Sequence[str] = getattr(result, "notes", ())
     for sentence in notes:
@@ -79,6 +79,11 @@ def print_result(result: "Result", as_json: bool) -> None:
         ANSWERS.print(table)
         if length > MAX_ROWS:
             ANSWERS.print(f"... and {length - MAX_ROWS} more rows; --json has all")
+    for title, headings, lines in text_tables(result):
+        table = Table(*headings, title=title)
+        for line in lines:
+            table.add_row(*line)
+        ANSWERS.print(table)
     rows = list(text_rows(result))
     width = max((len(label) for label, _ in rows), default=0)
     for label, value in rows:

@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from harness.commands import options
-from harness.commands.output import ANSWERS, emit
+from harness.commands.output import ANSWERS, emit, print_result
 
 if TYPE_CHECKING:
     from harness.objectfile.description import Description
@@ -40,21 +40,11 @@ def verify(folder: options.ObjectFolder, json: options.Json = False) -> int:
 
     Try: touchstone object verify objects/mug
     """
-    from harness.objectfile.published.entries import open_either
-    from harness.objectfile.verify.verify import verify as look
+    from harness import api
 
-    of = open_either(folder)
-    checks = look(of)
-    failed = [check for check in checks if not check.passed]
-    if json:
-        listed = [{"check": c.name, "passed": c.passed, "said": c.said} for c in checks]
-        emit({"schema": 1, "folder": str(folder), "verified": not failed, "checks": listed})
-        return 1 if failed else 0
-    for check in checks:
-        ANSWERS.print(f"{'ok  ' if check.passed else 'FAIL'}  {check.name}: {check.said}", markup=False)
-    count = f"{len(failed)} of {len(checks)} checks failed" if failed else f"all {len(checks)} checks hold"
-    ANSWERS.print(f"{of.description.name}: {count}", markup=False)
-    return 1 if failed else 0
+    verified = api.verify_object(folder)
+    print_result(verified, json)
+    return 0 if verified.verified else 1
 
 
 def published_lines(description: "PublishedDescription") -> list[str]:
