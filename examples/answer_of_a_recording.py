@@ -2,9 +2,9 @@
 
 import sys
 
-from harness.api import answer
+import touchstone
 
-found = answer(sys.argv[1])
+found = touchstone.answer(sys.argv[1])
 for sense, estimate in found["estimates"].items():
     if "refused" in estimate:
         print(f"{sense}: refused: {estimate['refused']}")

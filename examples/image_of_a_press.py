@@ -4,9 +4,9 @@ import sys
 
 import cv2
 
-from harness.api import tactile_image
+import touchstone
 
-press = tactile_image("builtin:mug", contact=(-0.04, 0.0, 0.05), depth=0.8e-3, tilt=0.1)
+press = touchstone.tactile_image("builtin:mug", contact=(-0.04, 0.0, 0.05), depth=0.8e-3, tilt=0.1)
 cv2.imwrite(sys.argv[1], press.image[..., ::-1])
 print(
     f"{press.image.shape}, {1e3 * press.deepest:.2f} mm deep; {sum(press.evaluation.seconds.values()):.3f} s"

@@ -2,10 +2,10 @@
 
 import sys
 
-from harness.api import modes
+import touchstone
 
 mesh, material = (sys.argv[1:] + ["builtin:wrench", "steel"][len(sys.argv) - 1 :])[:2]
-found = modes(mesh, material, count=6, edge=6e-3)
-for frequency in found.solution.modes.frequencies[:6]:
-    print(f"{frequency:8.1f} Hz")
-print(f"none is missing: {found.solution.certified}; {sum(found.seconds.values()):.1f} s")
+found = touchstone.modes(mesh, material, count=6, edge=6e-3)
+for frequency, damping in zip(found.frequencies_hz, found.dampings_per_s, strict=True):
+    print(f"{frequency:8.1f} Hz, decays as exp(-{damping:.3g} t)")
+print(f"none is missing: {found.certified}; {sum(found.seconds.values()):.1f} s")

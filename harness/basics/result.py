@@ -117,10 +117,10 @@ def heading(name: str) -> tuple[str, str]:
     return name.replace("_", " "), ""
 
 
-def number_text(name: str, value: float) -> str:
+def number_text(name: str, value: float, digits: int = 5) -> str:
     """Format a number of a field in the unit of its text, without the unit."""
     factor = next((factor for suffix, (factor, _) in _UNITS.items() if name.endswith(suffix)), 1.0)
-    return f"{value * factor:.5g}" if math.isfinite(value) else "none"
+    return f"{value * factor:.{digits}g}" if math.isfinite(value) else "none"
 
 
 def _text(name: str, value: Any) -> str:
@@ -129,7 +129,7 @@ def _text(name: str, value: Any) -> str:
     if isinstance(value, int):
         return str(value)
     if isinstance(value, float | np.number):
-        return " ".join(filter(None, (number_text(name, float(value)), heading(name)[1])))
+        return " ".join(filter(None, (number_text(name, float(value), 4), heading(name)[1])))
     if isinstance(value, Mapping):
         # Times by stage have no suffix of their own.
         unit = "_s" if name.startswith("seconds") else ""

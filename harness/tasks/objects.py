@@ -119,6 +119,13 @@ class TouchBuild(Result):
     notes: tuple[str, ...] = field(metadata=JSON_ONLY)
     built: BuiltTouch = field(metadata=HIDDEN)
 
+    def summary(self) -> tuple[str, ...]:
+        """State what the errors are of."""
+        return (
+            f"{self.folder}: {self.nodes} coded points; errors of presses by the codes, by the nearest trained "
+            "point and of an untouched gel (background)",
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class VisionBuild(Result):
@@ -136,6 +143,10 @@ class VisionBuild(Result):
     seconds_in_all: float
     notes: tuple[str, ...] = field(metadata=JSON_ONLY)
     built: BuiltVision = field(metadata=HIDDEN)
+
+    def summary(self) -> tuple[str, ...]:
+        """State what the errors are of."""
+        return (f"{self.folder}: {self.networks} networks; errors on pictures never trained on",)
 
 
 def build_objectfile(

@@ -5,8 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import nbformat
 import pytest
+from nbclient import NotebookClient
 
+import touchstone
+from harness import api
 from harness.api import answer, tactile_image
 from harness.basics.errors import OutOfDomain, WrongUse
 from tests.support.whole_run import in_process_run, touch_scene
@@ -43,6 +47,39 @@ def test_a_press_is_drawn_to_a_file(tmp_path: Path) -> None:
     said = run("image_of_a_press.py", str(tmp_path / "press.png"))
     assert "(120, 160, 3)" in said
     assert (tmp_path / "press.png").stat().st_size > 1000
+
+
+def test_a_strike_is_written_as_a_sound(tmp_path: Path) -> None:
+    said = run("sound_of_a_strike.py", str(tmp_path / "a.wav"), str(ROOT / "objects" / "mug"))
+    assert "modes; the loudest" in said
+    assert (tmp_path / "a.wav").stat().st_size > 60_000
+
+
+def test_an_object_is_drawn_by_its_networks(tmp_path: Path) -> None:
+    said = run("picture_of_an_object.py", str(tmp_path / "a.png"), str(ROOT / "objects" / "mug"))
+    assert "160 x 120 pixels" in said
+    assert (tmp_path / "a.png").stat().st_size > 1000
+
+
+def test_the_notebook_runs() -> None:
+    notebook = nbformat.read(ROOT / "examples" / "tour.ipynb", as_version=4)  # type: ignore[no-untyped-call]
+    NotebookClient(notebook, resources={"metadata": {"path": str(ROOT)}}).execute()
+    pictures = [output for cell in notebook.cells for output in cell.get("outputs", ()) if "data" in output]
+    assert sum("image/png" in picture["data"] for picture in pictures) == 3
+
+
+def test_touchstone_hands_on_every_name() -> None:
+    assert touchstone.__all__ == api.__all__ == dir(api)
+    for name in api.__all__:
+        assert getattr(touchstone, name) is getattr(api, name)
+    with pytest.raises(AttributeError, match="no attribute 'mode'"):
+        touchstone.mode  # noqa: B018 - mypy sees __getattr__
+
+
+def test_importing_touchstone_imports_nothing_else() -> None:
+    program = "import sys, touchstone; print({'numpy', 'harness.tasks'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
 
 
 def test_a_recording_is_answered_and_nothing_is_written(tmp_path: Path) -> None:

@@ -60,7 +60,7 @@ def test_a_block_becomes_an_object_file_that_can_be_touched(
     assert build(block) == 0
     said = capsys.readouterr().out
     assert "untouched gel" in said
-    assert "10th percentile" in said
+    assert "psnr db p10" in said
     assert (of.folder / "touch.onnx").read_bytes() == first
     assert invoke(["object", "info", str(of.folder)]) == 0
     assert "0.5 to 2 mm deep" in capsys.readouterr().out
