@@ -122,7 +122,7 @@ class TouchBuild(Result):
     def summary(self) -> tuple[str, ...]:
         """State what the errors are of."""
         return (
-            f"{self.folder}: {self.nodes} coded points; errors of presses by the codes, by the nearest trained "
+            f"{self.folder}: {self.nodes} coded points; errors of presses by codes, by the nearest trained "
             "point and of an untouched gel (background)",
         )
 
