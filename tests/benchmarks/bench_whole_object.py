@@ -13,7 +13,7 @@ of it on walls and with the cube in solids. Machine code must have been made bef
 import json
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,10 +33,24 @@ from harness.sim.modal.stage_seconds import cpu, wall
 from harness.sim.solid.surface_source import surface_of
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell
-from tests.samples.network_worth import HEADINGS, said, worth
 from tests.support.real_data import WHY_NOT, find_shared_data
 
 WAYS = ("network", "nearest_trained", "linear", "table_float16")
+ERRORS = {
+    "size [MB]": ("bytes", 1e-6),
+    "time of a vertex [us]": ("seconds_per_vertex", 1e6),
+    "gain error, median [%]": ("gain_error_median", 1e2),
+    "gain error, 95th percentile [%]": ("gain_error_p95", 1e2),
+    "STFT distance [1e-5]": ("stft_distance", 1e5),
+    "envelope distance [1e-4]": ("envelope_distance", 1e4),
+    "gain error [dB]": ("spectral_error_db", 1.0),
+}
+"""Heading: key of the errors that ``measure_audio`` returns, and the factor to the heading's unit."""
+
+
+def list_errors(errors: Mapping[str, float]) -> list[float]:
+    """List the errors in the order of ``ERRORS``; NaN where one is missing."""
+    return [errors.get(key, float("nan")) * scale for key, scale in ERRORS.values()]
 
 
 def requests(data: Path | None, profile: str, modes: int) -> dict[str, AudioRequest]:
@@ -103,18 +117,18 @@ def finish_errors(rows: Sequence[dict[str, Any]]) -> None:
     """Print or write errors at held-out vertices by object, then their mean and worst."""
     cells: list[list[Cell]] = []
     for way in WAYS:
-        cells += [[f"{row['object']}, {way}", row["cpu_s"], *said(worth(row["errors"][way]))] for row in rows]
+        cells += [[f"{row['object']}, {way}", row["cpu_s"], *list_errors(row["errors"][way])] for row in rows]
         for name, over in (("mean", np.nanmean), ("worst", np.nanmax)):
-            cells.append(
-                [f"{name}, {way}", None, *said([_of(over, column) for column in columns(rows, way)])]
-            )
-    heads = ("object, gains from", "mesh to verified file [CPU s] .0f", *HEADINGS)
+            cells.append([f"{name}, {way}", None, *(_of(over, column) for column in columns(rows, way))])
+    heads = ("object, gains from", "mesh to verified file [CPU s] .0f", *ERRORS)
     finish_figure("audionet", "objects", "; ".join(heads), cells)
 
 
 def columns(rows: Sequence[dict[str, Any]], way: str) -> Iterator[list[float]]:
-    """The numbers of every object, heading by heading."""
-    yield from (list(column) for column in zip(*(worth(row["errors"][way]) for row in rows), strict=True))
+    """The numbers of every object, column by column."""
+    yield from (
+        list(column) for column in zip(*(list_errors(row["errors"][way]) for row in rows), strict=True)
+    )
 
 
 def _of(over: Any, numbers: Sequence[float]) -> float:
