@@ -129,9 +129,9 @@ def test_an_interrupted_download_is_repeated_and_never_kept(
     assert fetch_data(tmp_path / "once", files, server.address) == []
     assert files_in(tmp_path / "once") == CONTENT
     server.interrupted = 2
-    (failure,) = fetch_data(tmp_path / "twice", files, server.address)
+    (failure,) = fetch_data(tmp_path / "twice", files[:1], server.address)
     assert failure.startswith("a/beam.npy: ")
-    assert files_in(tmp_path / "twice").keys() == CONTENT.keys() - {"a/beam.npy"}
+    assert not any(path.is_file() for path in (tmp_path / "twice").rglob("*"))
 
 
 def test_without_a_network_the_first_file_says_so(
