@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from harness.tasks.audio import RenderedAudio, render_audio
+    from harness.tasks.depth import PressDepth, depth
     from harness.tasks.modes import modes
     from harness.tasks.objects import (
         AudioBuild,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "AudioBuild": "harness.tasks.objects",
     "ComparedVision": "harness.tasks.vision",
+    "PressDepth": "harness.tasks.depth",
     "RenderedAudio": "harness.tasks.audio",
     "RenderedVision": "harness.tasks.vision",
     "TouchBuild": "harness.tasks.objects",
@@ -35,6 +37,7 @@ _HOMES = {
     "answer": "harness.tasks.runs",
     "build_objectfile": "harness.tasks.objects",
     "compare_vision": "harness.tasks.vision",
+    "depth": "harness.tasks.depth",
     "load_object": "harness.tasks.objects",
     "modes": "harness.tasks.modes",
     "render_audio": "harness.tasks.audio",
@@ -47,6 +50,7 @@ _HOMES = {
 __all__ = [
     "AudioBuild",
     "ComparedVision",
+    "PressDepth",
     "RenderedAudio",
     "RenderedVision",
     "TouchBuild",
@@ -55,6 +59,7 @@ __all__ = [
     "answer",
     "build_objectfile",
     "compare_vision",
+    "depth",
     "load_object",
     "modes",
     "render_audio",

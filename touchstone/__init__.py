@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from harness.api import (
         AudioBuild,
         ComparedVision,
+        PressDepth,
         RenderedAudio,
         RenderedVision,
         TouchBuild,
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
         answer,
         build_objectfile,
         compare_vision,
+        depth,
         load_object,
         modes,
         render_audio,
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AudioBuild",
     "ComparedVision",
+    "PressDepth",
     "RenderedAudio",
     "RenderedVision",
     "TouchBuild",
@@ -38,6 +41,7 @@ __all__ = [
     "answer",
     "build_objectfile",
     "compare_vision",
+    "depth",
     "load_object",
     "modes",
     "render_audio",

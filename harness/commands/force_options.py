@@ -10,7 +10,6 @@ from harness.commands import options
 
 if TYPE_CHECKING:
     from harness.effects.touch_press import Press
-    from harness.sim.gel.contact_force import ContactForce
     from harness.sim.gel.elastic import GelElastic
     from harness.sim.gel.force_table import ForceTable
 
@@ -98,38 +97,23 @@ def measured(table: Path | None, levels: list[str]) -> "tuple[ForceTable | None,
 
 def force_json(press: "Press") -> dict[str, Any]:
     """``force_n``, ``force_uncertainty_n`` and ``force``; each null where none was asked for."""
+    from harness.basics.result import json_value
+    from harness.tasks.press_force import describe_force
+
     found = press.force
     if found is None:
         return {"force_n": None, "force_uncertainty_n": None, "force": None}
     level = str(press.plan.levels[LEVEL])
     gel = None if level == "table" else press.gel.elastic
-    said = described(found, level, gel, lower_bound(press))
-    if gel is None and press.gel.forces is not None:
-        table = press.gel.forces
-        said["source"] = f"{table.indenter} on {table.sensor} {table.serial}: {table.made_from}"
+    table = press.gel.forces
+    source = (
+        None if table is None else f"{table.indenter} on {table.sensor} {table.serial}: {table.made_from}"
+    )
+    said = describe_force(found, level, gel, lower_bound(press), source)
     return {
         "force_n": float(found.newtons[0]),
         "force_uncertainty_n": float(found.uncertainty[0]),
-        "force": said,
-    }
-
-
-def described(found: "ContactForce", level: str, gel: "GelElastic | None", bound: bool) -> dict[str, Any]:
-    """What there is to say of the force of one press; ``gel`` is None where the force was measured."""
-    from harness.sim.gel.contact_force import PARTS
-
-    return {
-        "level": level,
-        "uncertainty_shares": dict(zip(PARTS, found.shares[0].tolist(), strict=True)),
-        "centre_m": found.centre[0].tolist() if found.newtons[0] > 0.0 else None,
-        "largest_pressure_pa": None if gel is None else float(found.pressure[0].max()),
-        "depth_share": float(found.depth_share[0]),
-        "strain": float(found.strain[0]),
-        "lower_bound": bound,
-        "beyond_checked": gel is not None and bool(found.beyond_checked[0]),
-        "young_pa": None if gel is None else gel.young,
-        "poisson": None if gel is None else gel.poisson,
-        "source": None if gel is None else gel.source,
+        "force": {name: json_value(value) for name, value in vars(said).items() if name != "thickness_m"},
     }
 
 
@@ -140,46 +124,19 @@ def lower_bound(press: "Press") -> bool:
     return found is not None and (bool(found.lower_bound[0]) or missing)
 
 
-def force_notes(press: "Press") -> list[str]:
+def press_force_notes(press: "Press") -> list[str]:
     """What the operator should know of the force."""
+    from harness.tasks.press_force import force_notes
+
     if press.force is None:
         return []
     gel = None if press.plan.levels[LEVEL] == "table" else press.gel.elastic
-    return noted(press.force, gel, lower_bound(press))
-
-
-def noted(found: "ContactForce", gel: "GelElastic | None", bound: bool) -> list[str]:
-    """The same of the force of one press; arguments as ``described``."""
-    from harness.sim.gel.contact_force import CHECKED
-    from harness.sim.gel.elastic import NOT_MEASURED
-
-    said = list[str]()
-    if found.newtons[0] == 0.0:
-        return said
-    if bound:
-        said.append("the force is a lower bound: what is not seen, or has no height, presses as well")
-    if gel is None:
-        return said
-    if found.beyond_checked[0]:
-        said.append(
-            f"the press is {found.depth_share[0]:.2f} thicknesses and {found.strain[0]:.2f} contact radii "
-            f"deep; the force is that of a linear gel, checked to {CHECKED[0]:g} and {CHECKED[1]:g}, and its "
-            "uncertainty does not count what is beyond"
-        )
-    if gel.source == NOT_MEASURED.source:
-        said.append(
-            "nobody measured this gel's modulus: press a known object with a known force, and say "
-            f"--gel-modulus, {gel.young:g} Pa times measured over computed"
-        )
-    return said
+    return force_notes(press.force, gel, lower_bound(press))
 
 
 def force_row(press: "Press") -> str | None:
     """For people; None where none was asked for."""
+    from harness.tasks.press_force import force_sentence
+
     found = press.force
-    return None if found is None else sentence(float(found.newtons[0]), float(found.uncertainty[0]))
-
-
-def sentence(newtons: float, uncertainty: float) -> str:
-    """For people."""
-    return f"pressed with {newtons:.3g} N (one standard deviation {uncertainty:.2g} N)"
+    return None if found is None else force_sentence(float(found.newtons[0]), float(found.uncertainty[0]))

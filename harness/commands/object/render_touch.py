@@ -10,7 +10,7 @@ import typer
 
 from harness.commands import force_options as forces
 from harness.commands import options, places
-from harness.commands.force_options import force_json, force_notes, force_row
+from harness.commands.force_options import force_json, force_row, press_force_notes
 from harness.commands.output import ANSWERS, emit, warn
 
 if TYPE_CHECKING:
@@ -231,7 +231,7 @@ def notes(rendered: RenderedPress) -> list[str]:
         said.append(f"the contact was moved {rendered.place.moved * 1e3:.3g} mm onto the surface")
     if press.touches_border:
         said.append("the contact reaches the edge of the window; there is more of it than is seen")
-    return said + force_notes(press)
+    return said + press_force_notes(press)
 
 
 def draw(rendered: RenderedPress, path: Path) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.commands.force_options import force_json, force_notes, force_row
+from harness.commands.force_options import force_json, force_row, press_force_notes
 from harness.commands.output import ANSWERS
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ class Touched:
             )
         if press.saturated:
             said.append(f"{press.saturated} values of the picture were clipped to black or white")
-        return said + force_notes(press)
+        return said + press_force_notes(press)
 
 
 def as_json(touched: Touched, out: Path, picture: Path | None, height_out: Path | None) -> dict[str, Any]:
