@@ -46,13 +46,13 @@ demo: $(RUN) ## localize a contact on the mocked bench, and write the report
 demo-shape: $(RUN) ## a picture, four presses where they say most, and the shape of an object never drawn
 	@$(BIN)/touchstone demo shape-reconstruction
 
-objectfiles: $(RUN) ## objects/ anew: networks of the sound, touch and look of our six objects (half an hour)
+objectfiles: $(RUN) ## harness/shipped/objects anew: networks of the sound, touch and look of our six objects (half an hour)
 	@rm -rf build/objects && mkdir -p build/objects
 	@for each in $(OBJECTS); do for part in audio touch vision; do \
 	  $(BIN)/touchstone object build builtin:$${each%:*} --material $${each#*:} --only $$part \
 	    --profile shipped --threads 1 --licence Apache-2.0 --out build/objects/$${each%:*} || exit; \
 	done; done
-	@rm -rf objects && mv build/objects objects
+	@rm -rf harness/shipped/objects && mv build/objects harness/shipped/objects
 
 test: $(DEV) sound lint types contracts ## everything CI checks
 	@$(BIN)/python -m pytest -m "not benchmark and not slow" -n auto --dist loadscope

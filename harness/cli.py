@@ -55,6 +55,9 @@ COMMANDS = {
         "harness.commands.run.demo:demo",
         "Localize a contact on the mocked bench from end to end, and write the report.",
     ),
+    "init": Command(
+        "harness.commands.init:init", "Write a station, a scene and a README to start a project from."
+    ),
     "run": Command(
         "harness.commands.run.run:run",
         "Run an experiment on a bench; with --resume, go on where one stopped.",

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
 
+from harness.bench.named_files import SHIPPED
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station_file import Station, load_station
 from tests.support.real_data import WHY_NOT, find_shared_data
@@ -49,13 +50,13 @@ def shared_data() -> Path:
 @pytest.fixture(scope="session")
 def scene() -> SceneFile:
     """The mug to be touched, as the example says."""
-    return load_scene(ROOT / "scenes" / "mug_touch.toml")
+    return load_scene(SHIPPED / "scenes" / "mug_touch.toml")
 
 
 @pytest.fixture(scope="session")
 def station() -> Station:
     """The mocked bench, as the example says."""
-    return load_station(ROOT / "stations" / "mock.toml")
+    return load_station(SHIPPED / "stations" / "mock.toml")
 
 
 class _ByFile(LoadScopeScheduling):  # type: ignore[misc]  # the library is not typed

@@ -343,7 +343,7 @@ class Fetcher:
     """
 
     def __init__(self, port: int) -> None:
-        command = [sys.executable, "-m", "drivers.dataq.fetch_child", str(port)]
+        command = [sys.executable, "-P", "-m", "drivers.dataq.fetch_child", str(port)]
         self._process = pipe.start_process(command, (port,))
         assert self._process.stdout is not None
         self._out = self._process.stdout.fileno()

@@ -65,7 +65,7 @@ class UrArm:
         self.rate = rate
         self._points = np.asarray(tool_points, dtype=np.float64).reshape(-1, 3)
         self._lock_folder = lock_folder
-        child = [sys.executable, "-m", "drivers.ur.child", "--address", address, "--model", model]
+        child = [sys.executable, "-P", "-m", "drivers.ur.child", "--address", address, "--model", model]
         self._command = command or [*child, "--rate", f"{rate:g}", "--patience", f"{limits.patience:g}"]
         self._alarm = alarm
         self._session: UrSession | None = None

@@ -33,8 +33,8 @@ SOLVED_WITHIN = 600.0
 
 ANSWER_WITHIN = 15.0
 END_WITHIN = 3.0
-COMMAND = (sys.executable, "-m", "mocks.lab")
-"""The program of a mocked lab."""
+COMMAND = (sys.executable, "-P", "-m", "mocks.lab")
+"""The program of a mocked lab; ``-P`` keeps a folder ``mocks`` of the working directory out of its way."""
 
 _TAIL = 2000
 _SCHEMA = 1

@@ -1,4 +1,4 @@
-"""Stations, scenes, ObjectFiles and runs by name: those that come with the program, and those here."""
+"""Stations, scenes, ObjectFiles and runs by name: those that come with the program, and a project's own."""
 
 import difflib
 from pathlib import Path
@@ -6,11 +6,14 @@ from pathlib import Path
 from harness.basics.errors import WrongUse
 from harness.basics.files.named_file import nearest
 
-_CHECKOUT = Path(__file__).parents[2]
+SHIPPED = Path(__file__).parents[1] / "shipped"
+"""The folders ``stations``, ``scenes`` and ``objects`` that come with the program."""
 
 
 def named_file(name: str, kind: str) -> Path:
-    """A TOML file by its path, or by its name in ``stations/`` or ``scenes/``, here or in the checkout.
+    """Find a TOML file by its path, or by its name in ``stations/`` or ``scenes/``, here or shipped.
+
+    The path of a shipped file, e.g. ``scenes/mug_touch.toml``, is found from any folder.
 
     Args:
         name: a text with a slash or an ending is a path.
@@ -19,24 +22,38 @@ def named_file(name: str, kind: str) -> Path:
     Raises:
         WrongUse: there is none.
     """
-    known = {path.stem: path.resolve() for path in shipped_or_here(f"{kind}s", "*.toml")}
-    if name.endswith(".toml") or "/" in name:
-        if not Path(name).is_file():
-            raise WrongUse(
-                f"there is no {kind} file {name!r}; give a path or a shipped name: {nearest(name, known)}"
-            )
-        return Path(name).resolve()
-    if name not in known:
-        raise WrongUse(
-            f"there is no {kind} {name!r}; {nearest(name, known)}; or give the path of a {kind} file"
-        )
-    return known[name]
+    path, is_path = Path(name), name.endswith(".toml") or "/" in name
+    if is_path and path.is_file():
+        return path.resolve()
+    known = known_files(f"{kind}s", "*.toml")
+    wanted = name_in(path, f"{kind}s") if is_path else f"{name}.toml"
+    if wanted in known:
+        return known[wanted]
+    listed = nearest(path.stem, [file.removesuffix(".toml") for file in known])
+    raise WrongUse(
+        f"there is no {kind} file {name!r}; give a path or a known name: {listed}"
+        if is_path
+        else f"there is no {kind} {name!r}; {listed}; or give the path of a {kind} file"
+    )
 
 
-def shipped_or_here(folder: str, pattern: str) -> list[Path]:
-    """What matches in a folder of the checkout and then in that of the working directory, each in order."""
-    places = (_CHECKOUT / folder, Path.cwd() / folder)
-    return [path for place in places for path in sorted(place.glob(pattern))]
+def known_files(folder: str, pattern: str) -> dict[str, Path]:
+    """Return what matches in a shipped folder and in that of the working directory, which comes first.
+
+    Args:
+        folder: ``stations``, ``scenes`` or ``objects``.
+        pattern: of names in it.
+
+    Returns:
+        Absolute paths by file name.
+    """
+    places = (SHIPPED / folder, Path.cwd() / folder)
+    return {path.name: path.resolve() for place in places for path in sorted(place.glob(pattern))}
+
+
+def name_in(path: Path, folder: str) -> str:
+    """Return the file name of a relative path into a folder of known files; empty for any other path."""
+    return path.name if path.parent == Path(folder) else ""
 
 
 HEADER = "run.json"

@@ -1,7 +1,7 @@
 """An ObjectFile as the object of a scene: its folder stands for mesh, name and material.
 
-Those that come with the program lie in ``objects/`` of the checkout, beside scenes and stations, and are
-found by their names alone, as stations are.
+Those that come with the program, and those in ``objects/`` of the working directory, are found by their
+names alone, as stations are.
 """
 
 import json
@@ -11,7 +11,7 @@ from typing import Any
 
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.files.named_file import nearest, real_path
-from harness.bench.named_files import shipped_or_here
+from harness.bench.named_files import known_files, name_in
 from harness.objects.builtin import BUILTIN, DESCRIPTION, MATERIALS
 
 OBJECTFILE = "objectfile:"
@@ -26,19 +26,21 @@ def holds_objectfile(folder: Path) -> bool:
 
 
 def shipped_objectfiles() -> dict[str, Path]:
-    """Folders of the ObjectFiles in ``objects/``, here or in the checkout, by their names."""
-    return {path.name: path.resolve() for path in shipped_or_here("objects", "*") if holds_objectfile(path)}
+    """Return the folders of the ObjectFiles in ``objects/``, here or shipped, by their names."""
+    return {name: path for name, path in known_files("objects", "*").items() if holds_objectfile(path)}
 
 
 def objectfile_folder(named: str, beside: Path) -> Path:
-    """The folder that a text means: a path, or the name of an ObjectFile in ``objects/``.
+    """Find the folder of an ObjectFile by its path, its name, or ``objects/NAME``.
 
     Args:
         named: what is at that path comes before what has that name.
         beside: the folder that a path is relative to.
     """
     path = real_path(beside / named)
-    return path if path.exists() else shipped_objectfiles().get(named, path)
+    if path.exists():
+        return path
+    return shipped_objectfiles().get(name_in(Path(named), "objects") or named, path)
 
 
 def require_object(named: str, beside: Path, where: str, objectfiles: bool = True) -> None:

@@ -169,7 +169,7 @@ class Station(StrictModel):
 
 
 def station_path(name: str) -> Path:
-    """The file of a station: a path, or a name found in ``stations/`` here or in the checkout.
+    """The file of a station: a path, or a name in ``stations/``, here or shipped.
 
     Raises:
         WrongUse: there is none.

@@ -3,6 +3,7 @@
 import datetime as dt
 import importlib.metadata
 import os
+import shutil
 import subprocess
 import uuid
 from collections.abc import Iterator, Mapping
@@ -264,7 +265,9 @@ def versions() -> dict[str, str]:
 
 
 def git_commit() -> str:
-    """Short hash of the checkout, + where it was changed; "unknown" where there is none."""
+    """Return the short hash of the checkout, + where it was changed; "unknown" outside a checkout."""
+    if shutil.which("git") is None or not (Path(__file__).parents[2] / ".git").exists():
+        return "unknown"
     described = subprocess.run(
         ["git", "describe", "--always", "--dirty=+", "--abbrev=12"],  # noqa: S607 - whichever git is installed
         cwd=Path(__file__).parent,

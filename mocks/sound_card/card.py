@@ -257,7 +257,7 @@ class SoundCard:
         for output, into in zip(outputs, inputs, strict=True):
             self._run(["pw-link", output, into])
         arguments = SPEAKER, str(self.rate), str(self.channels), str(self._quantum)
-        player = self._spawn([sys.executable, "-m", "mocks.sound_card.player", *arguments])
+        player = self._spawn([sys.executable, "-P", "-m", "mocks.sound_card.player", *arguments])
         if player.stdout is None or player.stdout.read(1) != b".":
             raise BenchFault(f"the mocked sound card's player did not start: {self._last_words()}")
 

@@ -36,14 +36,14 @@ REBASED: dict[str, str] = {}
 """Patterns of places that may differ, such as ``object_vision.json: *``, with the decision record of each."""
 
 RUNS = {
-    "mug": ("contact-localization", "--scene", "{code}/scenes/mug_both.toml", "--seed", "11"),
-    "bowl": ("contact-localization", "--scene", "{code}/scenes/bowl_touch.toml", "--seed", "12"),
+    "mug": ("contact-localization", "--scene", "mug_both", "--seed", "11"),
+    "bowl": ("contact-localization", "--scene", "bowl_touch", "--seed", "12"),
     "wrench": (
         *("contact-localization", "--object", "builtin:wrench", "--sense", "both"),
         *("--spacing", "spread", "--seed", "13"),
     ),
-    "size": ("scale-estimation", "--scene", "{code}/scenes/mug_size.toml", "--seed", "14"),
-    "shape": ("shape-reconstruction", "--scene", "{code}/scenes/mug_shape.toml", "--seed", "15"),
+    "size": ("scale-estimation", "--scene", "mug_size", "--seed", "14"),
+    "shape": ("shape-reconstruction", "--scene", "mug_shape", "--seed", "15"),
 }
 """Runs over the wires, by name."""
 
@@ -145,8 +145,7 @@ def record(reference: Side) -> None:
         _program("make", "-C", str(reference.code), "install")
     wires = ("--station", "mock", "--bench", "wires", "--json")
     for name, (experiment, *options) in RUNS.items():
-        filled = [option.format(code=reference.code) for option in options]
-        reference.write_once(f"run_{name}.json", "run", experiment, *wires, *filled, "--out", f"runs/{name}")
+        reference.write_once(f"run_{name}.json", "run", experiment, *wires, *options, "--out", f"runs/{name}")
     presses = ("--ball-radius", "2mm", "--presses", "20", "--run", "runs/taxim")
     reference.write_once("run_taxim.json", "calibrate", "taxim", *wires, *presses)
     reference.repeat(reference.made)

@@ -16,8 +16,6 @@ SOURCES = (
     "experiments",
     "calibration",
     "tests",
-    "stations",
-    "scenes",
     "examples",
 )
 

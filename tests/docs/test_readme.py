@@ -48,7 +48,6 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with what the README's names stand for."""
     folder = tmp_path_factory.mktemp("readme")
     in_process_run(folder / "RUN", touch_scene(contacts=2), seed=3)
-    (folder / "scenes").symlink_to(ROOT / "scenes")
     (folder / "objects.csv").write_text("name,material,mesh\nbowl,ceramic,builtin:bowl\n", encoding="utf-8")
     return folder
 

@@ -1,7 +1,6 @@
 """The scene camera's frame, pose and lamps, from a station and a scene: over the wire it is read by."""
 
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +8,7 @@ import pytest
 from harness.basics.arrays import ByteArray
 from harness.basics.errors import OutOfDomain, WrongUse
 from harness.basics.geometry import apply, inverse
+from harness.bench.named_files import SHIPPED
 from harness.bench.scene import Light, SceneFile, scene_from_options
 from harness.bench.scene_camera import scene_frame, scene_lamps, scene_pinhole
 from harness.bench.station_file import Station, load_station, station_path
@@ -17,7 +17,7 @@ from tests.oracles.seen_shapes import cuboid
 
 MESH = cuboid(0.1, 0.08, 0.06)
 SCENE = scene_from_options("builtin:mug")
-REAL = Path(__file__).parents[2] / "stations" / "example_bench.toml"
+REAL = SHIPPED / "stations" / "example_bench.toml"
 BENCH = load_station(station_path("mock"))
 
 

@@ -137,8 +137,8 @@ sys.path.insert(0, {tests!r})
 from pathlib import Path
 import test_lab_life as t
 from harness.bench.scene import load_scene
-from harness.bench.station_file import load_station
-scene, station = load_scene(Path("scenes/mug_touch.toml")), load_station(Path("stations/mock.toml"))
+from harness.bench.station_file import load_station, station_path
+scene, station = load_scene(Path("mug_touch")), load_station(station_path("mock"))
 lab = t.make_lab(scene, station, Path({truth!r}))
 where = lab.start()
 print(lab.process_id, where.addresses["arm"], lab._folder.path, flush=True)

@@ -16,6 +16,7 @@ from harness.bench.acquisition_channels import FORCE, PRESSURE
 from harness.bench.device import HAMMER, MICROPHONE
 from harness.bench.instruments.sound import rest_levels
 from harness.bench.microphone_take import BAD, CALLBACK, CLOCK, FLAGS, UNSURE, take_of
+from harness.bench.named_files import SHIPPED
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import RunContext, open_station
 from harness.bench.station_file import load_station
@@ -31,15 +32,14 @@ pytestmark = [
     pytest.mark.skipif(bool(why_not()), reason=why_not() or "a sound card can be mocked here"),
 ]
 
-ROOT = Path(__file__).parents[2]
-BOX = load_station(ROOT / "stations" / "mock.toml")
-CARD = load_station(ROOT / "stations" / "mock_sound_card.toml")
+BOX = load_station(SHIPPED / "stations" / "mock.toml")
+CARD = load_station(SHIPPED / "stations" / "mock_sound_card.toml")
 SEED, GAP = 5, "none"
 
 
 @pytest.fixture(scope="module")
 def scene() -> SceneFile:
-    read = load_scene(ROOT / "scenes" / "mug_both.toml")
+    read = load_scene(SHIPPED / "scenes" / "mug_both.toml")
     twice = read.section(Localization).model_copy(update={"contacts": 2})
     return read.with_section(twice)
 

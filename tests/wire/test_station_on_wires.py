@@ -9,16 +9,15 @@ import pytest
 
 from harness.basics.errors import BenchFault
 from harness.bench.device import CAMERA
+from harness.bench.named_files import SHIPPED
 from harness.bench.scene import load_scene
 from harness.bench.station import RunContext, open_station
 from harness.bench.station_file import load_station, station_path
 from harness.objects.household import build
 
-ROOT = Path(__file__).parents[2]
-
 
 def test_a_mocked_bench_opens_reads_and_leaves_nothing_behind(tmp_path: Path) -> None:
-    scene = load_scene(ROOT / "scenes" / "mug_touch.toml")
+    scene = load_scene(SHIPPED / "scenes" / "mug_touch.toml")
     scene = scene.model_copy(update={"sensors": scene.sensors.model_copy(update={"camera": True})})
     station = load_station(station_path("mock"))
     truth = tmp_path / "run.truth.json"

@@ -17,6 +17,7 @@ from harness.basics.mesh import Mesh
 from harness.bench.acquisition import strike_from_readings
 from harness.bench.acquisition_channels import CLOCK, FLAGS, FORCE, PRESSURE
 from harness.bench.device import HAMMER
+from harness.bench.named_files import SHIPPED
 from harness.bench.reading import Reading
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import STRIKE, Bench, RunContext, open_station
@@ -29,7 +30,6 @@ from harness.skills.strike import AFTER, BEFORE, POSE
 from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
 
-ROOT = Path(__file__).parents[2]
 SEED, GAP, STEP = 5, "none", 3
 RATE = 50e3
 
@@ -38,14 +38,14 @@ Readings = dict[str, Reading]
 
 @pytest.fixture(scope="module")
 def scene() -> SceneFile:
-    read = load_scene(ROOT / "scenes" / "mug_both.toml")
+    read = load_scene(SHIPPED / "scenes" / "mug_both.toml")
     once = read.section(Localization).model_copy(update={"contacts": 1})
     return read.with_section(once)
 
 
 @pytest.fixture(scope="module")
 def station() -> Station:
-    return load_station(ROOT / "stations" / "mock.toml")
+    return load_station(SHIPPED / "stations" / "mock.toml")
 
 
 @pytest.fixture(scope="module")

@@ -40,7 +40,7 @@ def demo(
     it with a mocked hammer, and where a picture is, a mocked camera looks first. With --bench wires they
     are at the far ends of their cables (RTDE, HTTP, a serial line), and the drivers are those of a real
     bench; the readings are the same. The estimates are made from the recording alone. What they are
-    compared with comes from the ObjectFile of the object that lies in objects/: its networks stand for
+    compared with comes from the ObjectFile of the object that comes with the program: its networks stand for
     finite elements and rasteriser. Where there is none, or with --objectfile, or for an unknown shape,
     the object is a mesh.
 

@@ -7,10 +7,10 @@ pixel. CPU ms in the median (quartiles), then of each part of the default.
 
 import argparse
 import time
-from pathlib import Path
 
 import numpy as np
 
+from harness.bench.named_files import SHIPPED
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.vision.render import Rendered, RenderSettings, open_vision
 from harness.objectfile.vision.view import camera_for, light_for, turned
@@ -50,7 +50,7 @@ def main() -> None:
 
 def measure(name: str, given: argparse.Namespace, errors: list[list[Cell]], parts: list[list[Cell]]) -> None:
     """Append errors and CPU time of every setting of one object, and the time of each stage."""
-    vision = open_vision(ObjectFile.open(Path("objects") / name), 1)
+    vision = open_vision(ObjectFile.open(SHIPPED / "objects" / name), 1)
     lit = LitObject(appearance_of(f"builtin:{name}", None, edge=_EDGE))
     first = camera_for(vision.surface, given.size, given.size)
     about, each = vision.surface.bounds.mean(axis=0), 2.0 * np.pi / given.views

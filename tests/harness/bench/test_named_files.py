@@ -5,18 +5,19 @@ from pathlib import Path
 import pytest
 
 from harness.basics.errors import WrongUse
-from harness.bench.named_files import named_file
-from harness.bench.scene import load_scene
-
-ROOT = Path(__file__).parents[3]
+from harness.bench.named_files import SHIPPED, named_file
+from harness.bench.scene import load_scene, scene_from_options
+from harness.bench.station_file import station_path
 
 
 def test_a_name_means_the_same_file_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    path = ROOT / "scenes" / "mug_touch.toml"
+    path = SHIPPED / "scenes" / "mug_touch.toml"
     assert named_file("mug_touch", "scene") == named_file(str(path), "scene") == path
-    assert load_scene(Path("mug_touch")) == load_scene(path)
-    assert named_file("mock", "station") == ROOT / "stations" / "mock.toml"
+    assert load_scene(Path("mug_touch")) == load_scene(path) == load_scene(Path("scenes/mug_touch.toml"))
+    assert station_path("stations/mock.toml") == station_path("mock")
+    assert scene_from_options("objects/mug/") == scene_from_options("mug")
+    assert named_file("mock", "station") == SHIPPED / "stations" / "mock.toml"
 
 
 def test_a_file_here_comes_before_one_of_that_name_that_comes_along(

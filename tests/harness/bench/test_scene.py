@@ -10,10 +10,11 @@ from experiments.contact_localization.section import Localization
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import apply, rotation_about
 from harness.basics.mesh import Mesh
+from harness.bench.named_files import SHIPPED
 from harness.bench.scene import load_scene, scene_from_json, scene_from_options
 from harness.objects.builtin import MATERIALS
 
-SCENES = sorted((Path(__file__).parents[3] / "scenes").glob("*.toml"))
+SCENES = sorted((SHIPPED / "scenes").glob("*.toml"))
 
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Mesh:

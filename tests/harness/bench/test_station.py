@@ -15,12 +15,13 @@ from harness.bench.device import CAMERA, HAMMER, Health
 from harness.bench.instruments import arm as arm_module
 from harness.bench.instruments import section as section_module
 from harness.bench.instruments.section import KINDS
+from harness.bench.named_files import SHIPPED
 from harness.bench.scene import SceneFile, Sensors, scene_from_options
 from harness.bench.station import RunContext, open_station
 from harness.bench.station_file import Station, load_station, station_from_json, station_path
 
-STATIONS = sorted((Path(__file__).parents[3] / "stations").glob("*.toml"))
-REAL = Path(__file__).parents[3] / "stations" / "example_bench.toml"
+STATIONS = sorted((SHIPPED / "stations").glob("*.toml"))
+REAL = SHIPPED / "stations" / "example_bench.toml"
 MESH = Mesh(np.vstack([np.zeros(3), np.eye(3)]) * 0.1, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
 
 

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -14,6 +13,7 @@ from experiments.contact_localization.section import Localization
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault, WrongUse
 from harness.basics.geometry import translation
+from harness.bench.named_files import SHIPPED
 from harness.bench.reading import Channel, Reading
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import STRIKE, Bench
@@ -33,7 +33,6 @@ from harness.skills.strike import (
     strike_by_hand,
 )
 
-ROOT = Path(__file__).parents[3]
 STATION = load_station(station_path("mock"))
 AXIS = np.array([1.0, 0.0, 0.0])
 MOTION = StrikeMotion(np.zeros(6), np.ones((2, 6)), translation(-0.03 * AXIS), np.eye(4), AXIS)
@@ -158,7 +157,7 @@ def test_a_motion_survives_the_plan_s_json() -> None:
 
 @pytest.fixture(scope="module")
 def both() -> SceneFile:
-    return load_scene(ROOT / "scenes" / "mug_both.toml")
+    return load_scene(SHIPPED / "scenes" / "mug_both.toml")
 
 
 @pytest.fixture(scope="module")

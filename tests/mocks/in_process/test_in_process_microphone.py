@@ -12,6 +12,7 @@ from harness.bench.acquisition import Strike, strike_from_readings
 from harness.bench.acquisition_channels import PRESSURE
 from harness.bench.device import MICROPHONE, Microphone
 from harness.bench.microphone_take import UNSURE, take_of
+from harness.bench.named_files import SHIPPED
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import Bench, RunContext
 from harness.bench.station_file import Station, load_station
@@ -26,13 +27,12 @@ from mocks.in_process.bench import in_process_bench
 from mocks.in_process.microphone import DRIFT_PPM, LATENCY, WANDER
 from tests.support.heard_strikes import Readings, delay, performed, strikes_on
 
-ROOT = Path(__file__).parents[3]
 SEED, RATE = 5, 48e3
 
 
 @pytest.fixture(scope="module")
 def scene() -> SceneFile:
-    read = load_scene(ROOT / "scenes" / "mug_both.toml")
+    read = load_scene(SHIPPED / "scenes" / "mug_both.toml")
     thrice = read.section(Localization).model_copy(update={"contacts": 3})
     return read.with_section(thrice)
 
@@ -42,8 +42,8 @@ def mesh(scene: SceneFile) -> Mesh:
     return known_object(scene).mesh
 
 
-BOX = load_station(ROOT / "stations" / "mock.toml")
-CARD = load_station(ROOT / "stations" / "mock_sound_card.toml")
+BOX = load_station(SHIPPED / "stations" / "mock.toml")
+CARD = load_station(SHIPPED / "stations" / "mock_sound_card.toml")
 
 
 @pytest.fixture(scope="module")

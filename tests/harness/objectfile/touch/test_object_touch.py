@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
+from harness.bench.named_files import SHIPPED
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.touch.nodes import SurfaceNodes, nodes_bytes, nodes_from
 from harness.objectfile.touch.touch import CodeMaps, open_touch
@@ -57,7 +58,7 @@ def test_a_touch_as_it_was_built_passes_every_check(peg_object: ObjectFile) -> N
 @pytest.mark.parametrize("name", ["mug", "plate"])
 def test_shipped_objects_have_codes_that_agree_with_their_meshes(name: str) -> None:
     """Where the far wall of a mug is in the sensor's way too."""
-    of = ObjectFile.open(Path(__file__).parents[4] / "objects" / name)
+    of = ObjectFile.open(SHIPPED / "objects" / name)
     touch = of.description.touch
     assert touch is not None
     assert touch.codes is not None
