@@ -32,9 +32,10 @@ In this folder:
     touchstone explain scenes/mug.toml
     touchstone check --station bench
 
-Runs are written to `runs/`, each with its recording, `result.json` and `report/report.html`; `touchstone replay RUN` answers one
-again without a bench. Stations, scenes and ObjectFiles are found by name in `stations/`, `scenes/` and `objects/` of this folder
-first, then among those that come with the program. `touchstone object build --help` makes the ObjectFile of your own object.
+Runs are written to `runs/`, each with its recording, `result.json` and `report/report.html`;
+`touchstone replay RUN` answers one again without a bench. Stations, scenes and ObjectFiles are found by
+name in `stations/`, `scenes/` and `objects/` of this folder first, then among those that come with the
+program. `touchstone object build` makes the ObjectFile of your own object.
 """
 
 

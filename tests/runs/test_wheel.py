@@ -14,28 +14,18 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("calibration", "drivers", "experiments", "harness", "mocks", "touchstone")
 
+RUN = ("run", "contact-localization", "--contacts", "1", "--json")
+
 COMMANDS = (
     ("object", "render", "vision", "mug", "--out", "mug.png", "--json"),
     ("explain", "objects/mug", "--json"),
     ("demo", "--contacts", "2", "--json"),
-    ("run", "contact-localization", "--station", "mock", "--scene", "mug_touch", "--contacts", "1", "--json"),
-    (
-        "calibrate",
-        "taxim",
-        "--station",
-        "stations/mock.toml",
-        "--ball-radius",
-        "2mm",
-        "--presses",
-        "20",
-        "--json",
-    ),
+    (*RUN, "--station", "mock", "--scene", "scenes/mug_touch.toml"),
+    ("calibrate", "taxim", "--station", "stations/mock.toml", "--presses", "20", "--json"),
     ("init", "lab", "--json"),
 )
 
-IN_PROJECT = (
-    ("run", "contact-localization", "--station", "bench", "--scene", "mug", "--contacts", "1", "--json"),
-)
+IN_PROJECT = ((*RUN, "--station", "bench", "--scene", "mug"),)
 
 PROGRAM = """
 import json, sys
