@@ -16,12 +16,14 @@ PACKAGES = ("calibration", "drivers", "experiments", "harness", "mocks", "touchs
 
 RUN = ("run", "contact-localization", "--contacts", "1", "--json")
 
+TWENTY = ("--presses", "20", "--json")
+
 COMMANDS = (
     ("object", "render", "vision", "mug", "--out", "mug.png", "--json"),
     ("explain", "objects/mug", "--json"),
-    ("demo", "--contacts", "2", "--json"),
+    ("demo", "--json"),
     (*RUN, "--station", "mock", "--scene", "scenes/mug_touch.toml"),
-    ("calibrate", "taxim", "--station", "stations/mock.toml", "--presses", "20", "--json"),
+    ("calibrate", "taxim", "--station", "stations/mock.toml", "--ball-radius", "2mm", *TWENTY),
     ("init", "lab", "--json"),
 )
 
