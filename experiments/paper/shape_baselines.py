@@ -7,22 +7,22 @@ from functools import cache
 import numpy as np
 from scipy.spatial import QhullError, cKDTree
 
-from experiments.shape_reconstruction.estimators.contact_samples import ContactSamples, all_samples
-from experiments.shape_reconstruction.estimators.free_space import (
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.prior.network import shipped, silhouette_to_glance_at
+from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples
+from experiments.shape_reconstruction.smooth.free_space import (
     Silhouette,
     sensor_depth,
     shift_sigma,
     silhouette_of,
 )
-from experiments.shape_reconstruction.estimators.grid import Grid
-from experiments.shape_reconstruction.estimators.knowledge import (
+from experiments.shape_reconstruction.smooth.grid import Grid
+from experiments.shape_reconstruction.smooth.knowledge import (
     beyond_deviation,
     known_by,
     limited_sides,
     not_bounded,
 )
-from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.glance.network import shipped, silhouette_to_glance_at
 from experiments.shape_reconstruction.surface import SUPPOSED, ShapeEstimate
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import FitRefused

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.shape_reconstruction.estimators.contact_samples import all_samples
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.glance.network import (
+from experiments.shape_reconstruction.prior.network import (
     SIDE,
     UNTOUCHED,
     WINDOW,
@@ -19,6 +18,7 @@ from experiments.shape_reconstruction.glance.network import (
     network_output,
     window_of,
 )
+from experiments.shape_reconstruction.smooth.contact_samples import all_samples
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused, OutOfDomain
 from harness.objectfile.runtime import Network

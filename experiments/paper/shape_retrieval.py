@@ -11,19 +11,19 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial import ConvexHull, cKDTree
 from scipy.spatial.distance import cdist
 
-from experiments.shape_reconstruction.estimators.contact_samples import ContactSamples, all_samples, thinned
-from experiments.shape_reconstruction.estimators.free_space import (
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
+from experiments.shape_reconstruction.smooth.free_space import (
     Silhouette,
     sensor_depth,
     silhouette_of,
 )
-from experiments.shape_reconstruction.estimators.knowledge import (
+from experiments.shape_reconstruction.smooth.knowledge import (
     beyond_deviation,
     known_by,
     limited_sides,
     not_bounded,
 )
-from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import MeshRefused, WrongUse

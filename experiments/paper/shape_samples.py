@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from experiments.paper.shape_network import frame_of, take_points
-from experiments.shape_reconstruction.glance.samples import (
+from experiments.shape_reconstruction.prior.samples import (
     WHOLE,
     CompletionSamples,
     SampleRow,

@@ -14,9 +14,9 @@ from torch import Tensor, nn
 
 from experiments.paper.shape_network import DENSE, INPUTS, TAKEN
 from experiments.paper.shape_samples import PRESSES, sense_samples
-from experiments.shape_reconstruction.glance.network import SIDE
-from experiments.shape_reconstruction.glance.samples import CompletionProfile
-from experiments.shape_reconstruction.glance.training import linear, train_completion
+from experiments.shape_reconstruction.prior.network import SIDE
+from experiments.shape_reconstruction.prior.samples import CompletionProfile
+from experiments.shape_reconstruction.prior.training import linear, train_completion
 from harness.authoring.resnet import ResNet18
 from harness.objectfile.graph import Nodes, float_value
 

@@ -18,7 +18,7 @@ from types import MappingProxyType
 
 from experiments.paper.scale_networks import SIZE_INPUTS
 from experiments.paper.shape_network import INPUTS as COMPLETION_INPUTS
-from experiments.shape_reconstruction.glance.samples import CompletionProfile
+from experiments.shape_reconstruction.prior.samples import CompletionProfile
 from harness.authoring.network_program import (
     DEVICES,
     chosen_networks,

@@ -3,12 +3,12 @@
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from experiments.shape_reconstruction.estimators.hermite import by_hermite
-from experiments.shape_reconstruction.estimators.stated_space import require_stated_size, require_stated_space
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
-from experiments.shape_reconstruction.fusion.reconstruct import reconstruct, reconstruct_with_prior
-from experiments.shape_reconstruction.glance.surface import by_glanced_surface
+from experiments.shape_reconstruction.prior.surface import by_glanced_surface
+from experiments.shape_reconstruction.reconstruct import reconstruct, reconstruct_with_prior
+from experiments.shape_reconstruction.smooth.hermite import by_hermite
+from experiments.shape_reconstruction.smooth.stated_space import require_stated_size, require_stated_space
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, OutOfDomain
 from harness.effects.accuracy import Level

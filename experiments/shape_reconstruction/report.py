@@ -7,9 +7,9 @@ import numpy as np
 
 from experiments.shape_reconstruction.answer import ShapeAnswer
 from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.explore.running import live_estimates, live_method
 from experiments.shape_reconstruction.metric import band_held, shape_error, surfaces_apart
 from experiments.shape_reconstruction.result import stem_of, true_surface
-from experiments.shape_reconstruction.running import live_estimates, live_method
 from experiments.shape_reconstruction.section import ShapeRun
 from experiments.shape_reconstruction.surface import SEEN, TOUCHED, ShapeEstimate
 from harness.basics.mesh import Mesh

@@ -8,11 +8,6 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from experiments.shape_reconstruction.estimators.contact_samples import all_samples
-from experiments.shape_reconstruction.estimators.free_space import silhouette_of
-from experiments.shape_reconstruction.estimators.knowledge import beyond_deviation, limited_sides
-from experiments.shape_reconstruction.estimators.knowledge import not_bounded as open_axes
-from experiments.shape_reconstruction.estimators.stated_space import TOO_LONG, longest_side, max_offset
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape
@@ -29,6 +24,11 @@ from experiments.shape_reconstruction.family.freedom import Strain
 from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
 from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
 from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
+from experiments.shape_reconstruction.smooth.contact_samples import all_samples
+from experiments.shape_reconstruction.smooth.free_space import silhouette_of
+from experiments.shape_reconstruction.smooth.knowledge import beyond_deviation, limited_sides
+from experiments.shape_reconstruction.smooth.knowledge import not_bounded as open_axes
+from experiments.shape_reconstruction.smooth.stated_space import TOO_LONG, longest_side, max_offset
 from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.errors import FitRefused, OutOfDomain

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from experiments.shape_reconstruction.estimators.grid import BodySurface, extract_body
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.distance import BOX, PREPARED, distance, prepare
 from experiments.shape_reconstruction.family.layout import FLOOR, HOLLOW, KIND, TURNED, WALL
 from experiments.shape_reconstruction.family.posterior import Mixture
+from experiments.shape_reconstruction.smooth.grid import BodySurface, extract_body
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
 

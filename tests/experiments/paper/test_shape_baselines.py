@@ -17,16 +17,16 @@ from experiments.paper.shape_baselines import (
     interpolate,
 )
 from experiments.paper.shape_table import points_error
-from experiments.shape_reconstruction.estimators.contact_samples import all_samples
-from experiments.shape_reconstruction.estimators.hermite import by_hermite
-from experiments.shape_reconstruction.estimators.knowledge import beyond_deviation, known_by, limited_sides
 from experiments.shape_reconstruction.metric import shape_error
+from experiments.shape_reconstruction.smooth.contact_samples import all_samples
+from experiments.shape_reconstruction.smooth.hermite import by_hermite
+from experiments.shape_reconstruction.smooth.knowledge import beyond_deviation, known_by, limited_sides
 from experiments.shape_reconstruction.surface import SUPPOSED
 from harness.basics.errors import FitRefused
 from harness.basics.faces.mesh_rays import is_inside
 from harness.objects.builtin import build
-from tests.experiments.shape_reconstruction.test_estimators import BOTH, LOOK, MUG, TOUCHES, require_whole
-from tests.experiments.shape_reconstruction.test_knowledge import touched
+from tests.experiments.shape_reconstruction.smooth.test_knowledge import touched
+from tests.experiments.shape_reconstruction.smooth.test_rbf import BOTH, LOOK, MUG, TOUCHES, require_whole
 from tests.experiments.shape_reconstruction.touched import evidence_of, look_at, touch_of
 
 

@@ -22,10 +22,9 @@ from experiments.paper.shape_network import (
 from experiments.paper.shape_samples import sense_samples
 from experiments.paper.shape_table import ROW_NAMES, rows_after, scored_rows
 from experiments.paper.train import main
-from experiments.shape_reconstruction.estimators.contact_samples import all_samples
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.explorer import plan
-from experiments.shape_reconstruction.glance.network import (
+from experiments.shape_reconstruction.explore.explorer import plan
+from experiments.shape_reconstruction.prior.network import (
     SIDE,
     UNTOUCHED,
     PointFrame,
@@ -33,6 +32,7 @@ from experiments.shape_reconstruction.glance.network import (
     window_of,
     window_points,
 )
+from experiments.shape_reconstruction.smooth.contact_samples import all_samples
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import DataRefused, FitRefused, WrongUse
 from harness.basics.faces.ray_mesh import RayMesh

@@ -5,7 +5,7 @@ import pytest
 
 from experiments.paper.shape_network import TAKEN, frame_of, take_points
 from experiments.paper.shape_samples import TouchedShape
-from experiments.shape_reconstruction.glance.samples import shape_of
+from experiments.shape_reconstruction.prior.samples import shape_of
 from harness.basics.errors import OutOfDomain
 from harness.basics.faces.nearest_surface import NearestSurface
 

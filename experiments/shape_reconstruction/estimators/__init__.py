@@ -1,1 +1,0 @@
-"""Estimators of shape that learn nothing: from raw points to a surface through the contacts."""

@@ -1,1 +1,0 @@
-"""One answer from the shape family, the smooth surface and the single-view prior."""

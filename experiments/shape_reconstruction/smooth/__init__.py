@@ -1,0 +1,1 @@
+"""Estimators without learning: smooth surfaces through contacts, bounded by free space and silhouette."""

@@ -1,0 +1,342 @@
+"""Fit a smooth surface through all contacts with their normals (thin-plate RBF).
+
+Rays along the border of a silhouette add places of the surface; contacts left out give its prediction error.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+from scipy.linalg import cho_solve
+from scipy.spatial import ConvexHull, QhullError, cKDTree
+
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
+from experiments.shape_reconstruction.smooth.free_space import (
+    CLEARANCE,
+    Silhouette,
+    sensor_depth,
+    silhouette_of,
+)
+from experiments.shape_reconstruction.smooth.grid import Grid
+from experiments.shape_reconstruction.smooth.knowledge import (
+    beyond_deviation,
+    hollow_deviation,
+    known_by,
+    limited_sides,
+    not_bounded,
+)
+from experiments.shape_reconstruction.smooth.revolution import (
+    SLACK,
+    Revolution,
+    TurnedRoom,
+    find_revolution,
+    turned_room,
+)
+from experiments.shape_reconstruction.smooth.thin_plate import SurfaceData, ThinPlateField, fitted
+from experiments.shape_reconstruction.surface import ShapeEstimate
+from harness.basics.arrays import FloatArray
+from harness.basics.mesh import Mesh
+
+PITCH = 4.0e-3
+"""M between corners of the grid on which the surface is found."""
+
+MARGIN = 10.0e-3
+"""M beyond the contacts that the object may reach."""
+
+SLOPE, ENTERED_SLOPE = 0.3, 0.15
+"""M beyond the hull of the contacts for every m from the nearest of them: the object reaches no farther. Less
+of a round body that the sensor went down into, whose contacts are turned about its axis. Found on sixteen
+development runs."""
+
+FOOT = 0.6
+"""Of the contacts' width that of the object at its support is, within the hull."""
+
+READING = 0.7e-3
+"""M, one standard deviation of any part of the surface at least: errors that all contacts share."""
+
+_HULL = 2.0e-3
+_SILHOUETTE = 1.0e-3
+_NORMAL = 0.1
+_COPY_SIGMA, _COPY_NORMAL, _COPIES = 2.0e-3, 0.2, 120
+_MOUTH = 0.05
+_SOME = 1200
+_NEAR = 2.0 * PITCH
+
+
+@dataclass(frozen=True, eq=False)
+class _Bounds:
+    """Where the object is at most: not beyond the hull of ``(n, 3)`` m of its places, nor in free space.
+
+    Of a round body free space is turned about its axis as well.
+    """
+
+    evidence: ShapeEvidence
+    places: FloatArray
+    silhouette: Silhouette | None
+    room: TurnedRoom | None
+
+    def beyond(self, points: FloatArray) -> FloatArray:
+        """``(n,)`` m that points are outside; below 0 within."""
+        outside = np.maximum(sensor_depth(self.evidence, points) - CLEARANCE, -points[:, 2])
+        near = cKDTree(self.places).query(points)[0]
+        slope = SLOPE if self.room is None else ENTERED_SLOPE
+        try:
+            sides = ConvexHull(self._hull_points).equations
+        except QhullError:  # it is flat, and bounds nothing
+            beyond = np.full(len(points), -1.0)
+        else:
+            beyond = np.full(len(points), -np.inf)
+            for side in sides:
+                np.maximum(beyond, points @ side[:3] + side[3], out=beyond)
+        outside = np.maximum(outside, beyond - _HULL - slope * near)
+        if self.room is not None:
+            outside = np.maximum(outside, self.room.at(points) - SLACK)
+        if self.silhouette is not None:
+            outside = np.maximum(outside, self.silhouette.outside_metres(points) - _SILHOUETTE)
+        return outside
+
+    @property
+    def _hull_points(self) -> FloatArray:
+        middle = self.places.mean(axis=0)
+        foot = (middle + FOOT * (self.places - middle)) * np.array([1.0, 1.0, 0.0])
+        return np.concatenate([self.places, foot])
+
+
+def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> ShapeEstimate:
+    """The zero of a thin-plate field through the contacts, cut by all that is known to be free.
+
+    Args:
+        evidence: one contact or more.
+        symmetric: whether contacts that agree on an axis are turned about it where nothing was touched.
+
+    Raises:
+        FitRefused: no touch met the object.
+        OutOfDomain: nothing is left of it: contacts and free space contradict each other.
+    """
+    start = time.perf_counter()
+    whole = all_samples(evidence)
+    samples = thinned(whole)
+    silhouette = silhouette_of(evidence, samples.points)
+    axis = find_revolution(samples) if symmetric else None
+    normal_sigmas = np.maximum(samples.normal_sigmas, _NORMAL)
+    data = SurfaceData(
+        samples.points, np.zeros(len(samples.points)), samples.sigmas, samples.normals, normal_sigmas
+    )
+    low, high = _box(data.points, evidence.largest)
+    by_contacts = field = fitted(data, low, high)
+    left_out = predict_by_field(evidence, by_contacts)
+    if axis is not None:
+        data = data.joined(_copies(axis, samples, evidence, silhouette))
+        low, high = _box(data.points, evidence.largest)
+        field = fitted(data, low, high, by_contacts.amplitude)
+    room = None if axis is None else turned_room(axis, samples, evidence)
+    bounds = _Bounds(evidence, data.points, silhouette, room)
+    if silhouette is not None:
+        rim = rim_data(silhouette, _cut(field, bounds), data.points, low, high)
+        field = fitted(data.joined(rim), low, high, by_contacts.amplitude)
+    grid = Grid.over(low, high, PITCH)
+    body = grid.surface(grid.near_zero(_cut(field, bounds)), samples.points)
+    found = _finished(_Fit(evidence, whole, silhouette, field, axis, left_out), body.mesh, start)
+    return replace(found, flags=(*found.flags, *body.notes))
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """Predictions of left-out contacts by the field."""
+
+    errors: FloatArray
+    """``(contacts,)`` rms distance of each from the field fitted without it, m; zero where thinning kept no
+    point of it."""
+    outliers: dict[int, float]
+    """distance by the index of the touch, m, of those more than ``DOUBTFUL`` standard deviations off."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """What the answer is made of."""
+
+    evidence: ShapeEvidence
+    samples: ContactSamples
+    silhouette: Silhouette | None
+    field: ThinPlateField
+    axis: Revolution | None
+    left_out: LeftOut
+
+
+def _finished(fit: _Fit, mesh: Mesh, start: float) -> ShapeEstimate:
+    known = known_by(mesh, fit.samples, fit.silhouette)
+    sides = limited_sides(mesh, fit.samples, fit.silhouette)
+    beyond = beyond_deviation(mesh, known, sides, fit.evidence.largest)
+    hollow = hollow_deviation(mesh, known, fit.samples)
+    some = np.random.default_rng(0).permutation(len(mesh.vertices))[:_SOME]
+    deviations = fit.field.deviations(mesh.vertices[some])
+    # The other vertices are as the nearest three of those.
+    apart, near = (np.asarray(one) for one in cKDTree(mesh.vertices[some]).query(mesh.vertices, k=[1, 2, 3]))
+    share = 1.0 / (apart + 1e-6)
+    smooth = np.asarray((share * deviations[near]).sum(axis=1) / share.sum(axis=1))
+    round_ = "supposed to be round about a vertical axis, as its contacts are" if fit.axis else ""
+    open_ = (
+        "may be hollow: its top was touched nowhere near its middle" if (hollow > 0.0).mean() > _MOUTH else ""
+    )
+    return ShapeEstimate(
+        mesh=mesh,
+        deviation=np.sqrt(smooth**2 + READING**2 + beyond**2 + hollow**2),
+        known_by=known,
+        not_bounded=not_bounded(sides),
+        doubtful=fit.left_out.outliers,
+        flags=tuple(flag for flag in (round_, open_) if flag),
+        seconds=time.perf_counter() - start,
+        details={
+            "estimator": "rbf",
+            "contacts": len(fit.evidence.contacts),
+            "amplitude": fit.field.amplitude,
+            "left_out_m": fit.left_out.errors.tolist(),
+            "axis_m": None if fit.axis is None else [float(value) for value in fit.axis.centre],
+        },
+    )
+
+
+def _copies(
+    axis: Revolution, samples: ContactSamples, evidence: ShapeEvidence, silhouette: Silhouette | None
+) -> SurfaceData:
+    """Places supposed by turning, where neither the sensor nor the picture says that nothing is."""
+    places, normals = axis.copies(samples)
+    free = sensor_depth(evidence, places) > CLEARANCE
+    if silhouette is not None:
+        free |= silhouette.outside_metres(places) > 2.0 * _SILHOUETTE
+    places, normals = places[~free], normals[~free]
+    some = np.random.default_rng(0).permutation(len(places))[:_COPIES]
+    count = len(some)
+    return SurfaceData(
+        places[some],
+        np.zeros(count),
+        np.full(count, _COPY_SIGMA),
+        normals[some],
+        np.full(count, _COPY_NORMAL),
+    )
+
+
+def _box(points: FloatArray, largest: float) -> tuple[FloatArray, FloatArray]:
+    low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    low[2] = 0.0
+    high[2] = max(high[2], 2.0 * PITCH)
+    return low, np.minimum(high, low + largest + 2.0 * MARGIN)
+
+
+def _cut(field: ThinPlateField, bounds: _Bounds) -> Callable[[FloatArray], FloatArray]:
+    """The field, and what bounds it where it might be inside."""
+
+    def cut(points: FloatArray) -> FloatArray:
+        values = field.values(points)
+        near = values < _NEAR
+        values[near] = np.maximum(values[near], bounds.beyond(points[near]))
+        return values
+
+    return cut
+
+
+RAYS = 60
+"""Along the whole border, evenly."""
+
+SIGMA = 2.5e-3
+"""M, one standard deviation of such a place along its normal: pixels, what is left of the camera's errors."""
+
+NORMAL_SIGMA = 0.3
+APART = 10.0e-3
+"""M from any contact, within which the contact knows better."""
+
+_DEPTHS = 40
+
+
+def rim_data(
+    silhouette: Silhouette,
+    field: Callable[[FloatArray], FloatArray],
+    contacts: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+) -> SurfaceData:
+    """Where a field comes nearest to the rays of the border, as data of the surface.
+
+    Args:
+        silhouette: of the picture.
+        field: m at ``(n, 3)`` m, below zero inside.
+        contacts: ``(n, 3)`` m.
+        low: ``(3,)`` m, of the box in which the object is.
+        high: ``(3,)`` m.
+    """
+    pixels, outward = _border(silhouette)
+    pose = silhouette.look.stand_from_camera
+    origin = pose[:3, 3]
+    middle = 0.5 * np.array(silhouette.look.mask.shape[::-1])
+    in_camera = (pixels - middle - silhouette.shift) / silhouette.look.focal_length
+    rays = np.column_stack([in_camera, np.ones(len(in_camera))]) @ pose[:3, :3].T
+    corners = np.array(
+        [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    )
+    deep = (corners - origin) @ pose[:3, 2]
+    depths = np.linspace(float(deep.min()), float(deep.max()), _DEPTHS)
+    along = origin + depths[None, :, None] * rays[:, None]
+    inside = ((along >= low) & (along <= high)).all(axis=2)
+    values = np.where(inside, field(along.reshape(-1, 3)).reshape(inside.shape), np.inf)
+    best = values.argmin(axis=1)
+    places = along[np.arange(len(along)), best]
+    normals = np.column_stack([outward, np.zeros(len(outward))]) @ pose[:3, :3].T
+    kept = np.isfinite(values.min(axis=1))
+    if len(contacts):
+        kept &= cKDTree(contacts).query(places)[0] > APART
+    count = int(kept.sum())
+    return SurfaceData(
+        places[kept], np.zeros(count), np.full(count, SIGMA), normals[kept], np.full(count, NORMAL_SIGMA)
+    )
+
+
+def _border(silhouette: Silhouette) -> tuple[FloatArray, FloatArray]:
+    """``(n, 2)`` pixels of the mask's border that nothing may hide, and the direction out of the mask."""
+    mask, hidden = silhouette.look.mask, silhouette.look.hidden
+    rim = mask & ~ndimage.binary_erosion(mask) & ~ndimage.binary_dilation(hidden, iterations=2)
+    rim[[0, -1]], rim[:, [0, -1]] = False, False  # there the picture ends, not the object
+    rows, columns = np.nonzero(rim)
+    if len(rows) == 0:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    slope = [ndimage.gaussian_filter(silhouette.outside, 1.5, order=order) for order in ((0, 1), (1, 0))]
+    outward = np.column_stack([axis[rows, columns] for axis in slope])
+    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-9)
+    around = np.argsort(np.arctan2(rows - rows.mean(), columns - columns.mean()))
+    some = around[np.unique(np.linspace(0, len(around) - 1, RAYS).astype(int))]
+    return np.column_stack([columns + 0.5, rows + 0.5])[some], outward[some]
+
+
+DOUBTFUL = 4.0
+"""Standard deviations between a contact and its prediction above which it is an outlier."""
+
+_SAME_PLACE = 1e-12
+
+
+def predict_by_field(evidence: ShapeEvidence, field: ThinPlateField) -> LeftOut:
+    """Predict each contact from the field without it.
+
+    With ``P`` the inverse of the covariance, a block left out is off by ``inv(P_bb) (P y)_b``, with the
+    covariance ``inv(P_bb)`` (Rasmussen and Williams, Gaussian processes for machine learning, 2006,
+    section 5.4.2).
+    """
+    count = 4 * len(field.data.points)
+    inverse = cho_solve((field.factor, True), np.eye(count), check_finite=False)
+    errors, found = np.zeros(len(evidence.contacts)), {}
+    for number, contact in enumerate(evidence.contacts):
+        apart = ((field.data.points[:, None] - contact.points[None]) ** 2).sum(axis=2).min(axis=1)
+        # Numbers of the values and gradients that are this contact's.
+        rows = [4 * int(k) + i for k in np.nonzero(apart < _SAME_PLACE)[0] for i in range(4)]
+        if len(rows) == 0:
+            continue
+        block = np.linalg.inv(inverse[np.ix_(rows, rows)])
+        off = block @ field.weights.ravel()[rows]
+        values = slice(0, None, 4)
+        errors[number] = field.reach * float(np.sqrt(np.mean(off[values] ** 2)))
+        mean = float(off[values].mean())
+        sigma = float(np.sqrt(block[values, values].mean()))
+        if abs(mean) > DOUBTFUL * sigma:
+            found[contact.index] = abs(mean) * field.reach
+    return LeftOut(errors, found)

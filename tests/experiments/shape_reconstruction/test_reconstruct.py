@@ -1,0 +1,196 @@
+"""Number of searches of the family, the fit that is kept, and its competitors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.shape_reconstruction import reconstruct as reconstruction
+from experiments.shape_reconstruction.choice import MAX_OUTLINE_ERROR, MIN_CONTACTS, Candidate
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.family.estimate import LEFT, LOOSE, RIVAL
+from experiments.shape_reconstruction.family.freedom import STRAINED
+from experiments.shape_reconstruction.family.settings import CONTINUED, FamilySettings
+from experiments.shape_reconstruction.prior.network import shipped, with_supposed
+from experiments.shape_reconstruction.reconstruct import (
+    SEARCHES,
+    UNEASY,
+    reconstruct,
+    reconstruct_with_prior,
+)
+from experiments.shape_reconstruction.smooth.hermite import by_hermite
+from experiments.shape_reconstruction.surface import ShapeEstimate
+from harness.basics.errors import FitRefused, OutOfDomain
+from harness.objects.builtin import build
+from tests.support.shape_readings import look_at, shape_readings, touches_on
+
+MUG = build("mug")
+READINGS = shape_readings(touches_on(MUG, 12, seed=0), look_at(MUG))
+SMOOTH = by_hermite(READINGS, symmetric=False)
+HYPOTHESES: list[object] = []
+
+
+def part(contacts: int, sighted: bool = True) -> ShapeEvidence:
+    return replace(READINGS, touches=READINGS.touches[:contacts], look=READINGS.look if sighted else None)
+
+
+def details_of(poor: bool = False, strain: float = 0.0, rival: float = 0.0) -> dict[str, object]:
+    """Details of the family's estimate besides its surface."""
+    return {
+        "cost": 1.0, "contact_cost": (2.0 if poor else 0.1) * LOOSE, "strain": strain,
+        "strained": strain > STRAINED, "sighted": True, "beyond_m": 0.0, "hypotheses": HYPOTHESES,
+        "classes": {"mug": 1.0 - rival, "jug": rival}, "estimator": "family",
+    }  # fmt: skip
+
+
+class Family:
+    """Stands for the family's search; every search has a number, which is its estimate's flag."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *found: dict[str, object]) -> None:
+        self.found, self.seeds, self.given = found, list[int](), list[ShapeEvidence]()
+        self.begun: list[tuple[ShapeEstimate, ...]] = []
+        self.outline = 0.0
+        monkeypatch.setattr(reconstruction, "family_estimate", self)
+        monkeypatch.setattr(reconstruction, "outline_error", lambda *_: self.outline)
+        monkeypatch.setattr(reconstruction, "predict_left_out", lambda *_: np.zeros(0))
+        monkeypatch.setattr(
+            reconstruction, "_smooth", lambda evidence: Candidate(SMOOTH, np.zeros(len(evidence.contacts)))
+        )
+
+    def __call__(
+        self, evidence: ShapeEvidence, settings: FamilySettings, previous: tuple[ShapeEstimate, ...] = ()
+    ) -> ShapeEstimate:
+        number = len(self.seeds)
+        self.given.append(evidence)
+        self.begun.append(previous)
+        self.seeds.append(settings.seed)
+        details = self.found[min(number, len(self.found) - 1)]
+        return replace(SMOOTH, details=details, flags=(f"search {number}",), seconds=1.0)
+
+
+GOOD, POOR = details_of(), details_of(poor=True)
+
+
+@pytest.mark.parametrize(
+    ("contacts", "sighted", "found", "made", "kept"),
+    [
+        (8, True, [GOOD], 1, 0),
+        (8, False, [GOOD], 2, 0),  # without a picture the cost has more local minima
+        (5, False, [GOOD], 1, 0),
+        (8, True, [POOR], SEARCHES, 0),  # of equals the first
+        (8, True, [POOR, GOOD], 2, 1),
+        (8, True, [POOR, {**POOR, "contact_cost": 1.5 * LOOSE, "cost": 9.0}, POOR], SEARCHES, 1),
+        (1, True, [POOR, GOOD], 2, 1),
+        (8, True, [details_of(strain=1.1 * STRAINED), GOOD], 2, 1),
+        (8, True, [details_of(rival=1.1 * RIVAL), {**GOOD, "cost": 0.5}], 2, 1),
+        (5, True, [details_of(rival=1.1 * RIVAL)], 1, 0),
+        (5, True, [details_of(strain=1.1 * UNEASY), {**GOOD, "cost": 0.5}], 2, 1),
+        (8, True, [details_of(strain=1.1 * UNEASY)], 1, 0),
+    ],
+)
+def test_a_poor_or_undecided_fit_is_searched_again_and_the_best_is_kept(
+    monkeypatch: pytest.MonkeyPatch,
+    contacts: int,
+    sighted: bool,
+    found: list[dict[str, object]],
+    made: int,
+    kept: int,
+) -> None:
+    family = Family(monkeypatch, *found)
+    answer = reconstruct(part(contacts, sighted))
+    assert answer.flags[0] == f"search {kept}"
+    assert len(family.seeds) == len(set(family.seeds)) == made  # each by draws of its own
+    assert answer.seconds == pytest.approx(made + SMOOTH.seconds)
+
+
+def test_a_fit_beside_the_outline_is_searched_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    family = Family(monkeypatch, GOOD)
+    family.outline = 1.1 * MAX_OUTLINE_ERROR
+    answer = reconstruct(part(8))
+    assert len(family.seeds) == SEARCHES
+    assert "of the outline" in answer.flags[-1]
+    assert answer.details[LEFT] is HYPOTHESES  # where the next press begins
+
+
+@pytest.mark.parametrize(
+    ("first", "again"), [(POOR, True), (details_of(strain=1.1 * STRAINED), True), (GOOD, False)]
+)
+def test_between_presses_a_poor_fit_is_searched_again_beside_its_hypotheses(
+    monkeypatch: pytest.MonkeyPatch, first: dict[str, object], again: bool
+) -> None:
+    family = Family(monkeypatch, first, GOOD)
+    answer = reconstruct(part(8), CONTINUED, SMOOTH)
+    assert answer.flags[0] == f"search {int(again)}"
+    assert [[one.flags for one in begun] for begun in family.begun] == [[SMOOTH.flags], [("search 0",)]][
+        : 1 + again
+    ]
+
+
+@pytest.mark.parametrize(
+    ("contacts", "supposed"), [(1, True), (MIN_CONTACTS - 1, True), (MIN_CONTACTS, False)]
+)
+def test_few_contacts_are_helped_by_the_prior(
+    monkeypatch: pytest.MonkeyPatch, contacts: int, supposed: bool
+) -> None:
+    family = Family(monkeypatch, GOOD)
+    reconstruct(part(contacts))
+    expected = with_supposed(READINGS).supposed if supposed else np.zeros((0, 3))
+    np.testing.assert_array_equal(family.given[0].supposed, expected)
+
+
+def test_the_prior_s_points_are_those_of_the_network_and_none_without_a_picture() -> None:
+    assert READINGS.look is not None
+    np.testing.assert_array_equal(with_supposed(READINGS).supposed, shipped().points(READINGS.look))
+    assert len(with_supposed(part(1, sighted=False)).supposed) == 0
+
+
+def test_without_a_contact_the_prior_answers_and_during_a_run_the_family(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    family = Family(monkeypatch, GOOD)
+    monkeypatch.setattr(reconstruction, "_smooth", lambda _: None)
+    assert reconstruct_with_prior(part(0)).details["estimator"] == "glance"
+    assert not family.seeds
+    assert reconstruct(part(0)).flags[0] == "search 0"  # the next press needs its hypotheses
+
+
+def test_without_a_household_shape_at_the_stated_place_the_smooth_surface_answers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    Family(monkeypatch, GOOD)
+
+    def refuse(*_: object) -> ShapeEstimate:
+        raise FitRefused("too long")
+
+    monkeypatch.setattr(reconstruction, "family_estimate", refuse)
+    assert "no household shape at the stated place" in reconstruct(part(2)).flags[-1]
+    monkeypatch.setattr(reconstruction, "_smooth", lambda _: None)
+    with pytest.raises(FitRefused, match="too long"):
+        reconstruct(part(2))
+
+
+@pytest.mark.parametrize(
+    ("outlines", "misfits", "kept"),
+    [((0.0, 0.0), (2e-3, 1e-3), 1), ((0.0, 0.5), (2e-3, 1e-3), 0), ((0.5, 0.0), (1e-3, 2e-3), 1)],
+)
+def test_of_two_smooth_surfaces_that_show_the_outline_the_better_prediction_is_kept(
+    monkeypatch: pytest.MonkeyPatch, outlines: tuple[float, float], misfits: tuple[float, float], kept: int
+) -> None:
+    made = [replace(SMOOTH, flags=(str(k),), details={"left_out_m": [misfits[k]]}) for k in (0, 1)]
+    monkeypatch.setattr(reconstruction, "bend_prior", lambda _: Candidate(made[0], np.array(misfits[:1])))
+    monkeypatch.setattr(reconstruction, "by_hermite", lambda *_, **__: made[1])
+    shown = iter(outlines)
+    monkeypatch.setattr(reconstruction, "outline_error", lambda *_: next(shown))
+    found = reconstruction._smooth(part(MIN_CONTACTS))
+    assert found is not None
+    assert found.estimate.flags == (str(kept),)
+
+
+def test_where_no_smooth_surface_is_left_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> ShapeEstimate:
+        raise OutOfDomain("nothing is left")
+
+    monkeypatch.setattr(reconstruction, "bend_prior", refuse)
+    monkeypatch.setattr(reconstruction, "by_hermite", refuse)
+    assert reconstruction._smooth(part(2)) is None
+    assert reconstruction._smooth(part(0)) is None
