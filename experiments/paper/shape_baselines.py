@@ -68,7 +68,8 @@ def by_average(evidence: ShapeEvidence) -> ShapeEstimate:
         doubtful={},
         flags=("the average household shape; no reading was used",),
         seconds=time.perf_counter() - start,
-        details={"estimator": "average", "shapes": SHAPES, "size_m": size},
+        estimator="average",
+        counts={"shapes": SHAPES},
     )
 
 
@@ -228,7 +229,8 @@ def _with_deviation(
         doubtful={},
         flags=(),
         seconds=time.perf_counter() - start,
-        details={"estimator": name, "contacts": len(evidence.contacts)},
+        estimator=name,
+        counts={"contacts": len(evidence.contacts)},
     )
 
 

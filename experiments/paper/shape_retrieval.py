@@ -299,7 +299,14 @@ READING = 0.7e-3
 """Standard deviation of a contact, m."""
 
 
-def by_retrieval(evidence: ShapeEvidence, library: Sequence[LibraryShape]) -> ShapeEstimate:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RetrievedShape(ShapeEstimate):
+    """The shape of a library that fits best, bent to the contacts."""
+
+    ranked: tuple[PlacedShape, ...]  #: the shapes that fit best, in the order of their cost.
+
+
+def by_retrieval(evidence: ShapeEvidence, library: Sequence[LibraryShape]) -> RetrievedShape:
     """Choose the shape of a library that fits best, and bend it to the contacts.
 
     Args:
@@ -336,7 +343,7 @@ def by_retrieval(evidence: ShapeEvidence, library: Sequence[LibraryShape]) -> Sh
         squares += weight * NearestSurface(one.mesh).distances(mesh.vertices) ** 2
     deviation = np.sqrt(squares / weights.sum()) ** 2 + READING**2
     deviation += beyond_deviation(mesh, known, sides, evidence.largest) ** 2
-    return ShapeEstimate(
+    return RetrievedShape(
         mesh=mesh,
         deviation=np.sqrt(deviation),
         known_by=known,
@@ -344,10 +351,8 @@ def by_retrieval(evidence: ShapeEvidence, library: Sequence[LibraryShape]) -> Sh
         doubtful={},
         flags=(),
         seconds=time.perf_counter() - start,
-        details={
-            "estimator": "retrieval",
-            "shapes": [{"name": one.shape.name, "size_m": one.size, "cost": one.cost} for one in ranked],
-        },
+        estimator="retrieval",
+        ranked=tuple(ranked),
     )
 
 

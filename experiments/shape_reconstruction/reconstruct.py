@@ -1,9 +1,8 @@
 """Reconstruct a shape from contacts, silhouette and the single-view prior."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -11,27 +10,23 @@ from scipy import ndimage
 from experiments.shape_reconstruction.choice import (
     MAX_OUTLINE_ERROR,
     MIN_CONTACTS,
-    Candidate,
     choose,
-    folds_of,
     rejection_reason,
 )
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
-from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.contact_fit import contact_fit, displacement, moved_points
 from experiments.shape_reconstruction.family.estimate import (
-    LEFT,
     LOOSE,
     OUTSIDE,
     POINT_SIGMA,
     RIVAL,
-    family_estimate,
+    fit_family,
     open_without_class,
 )
-from experiments.shape_reconstruction.family.freedom import STRAINED
 from experiments.shape_reconstruction.family.observed import directions_of
-from experiments.shape_reconstruction.family.search import FamilySearch
+from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
 from experiments.shape_reconstruction.family.settings import ANEW, FamilySettings
+from experiments.shape_reconstruction.fits import FamilyFit, SmoothFit, folds_of
 from experiments.shape_reconstruction.prior.network import with_supposed
 from experiments.shape_reconstruction.prior.surface import by_glanced_surface
 from experiments.shape_reconstruction.smooth.bent_prior import bend_prior
@@ -55,7 +50,7 @@ def reconstruct_with_prior(evidence: ShapeEvidence, settings: FamilySettings | N
 
     Args:
         evidence: one contact or a silhouette at least.
-        settings: how much of the family is searched; the default level where not given.
+        settings: amount of search; the default level where not given.
 
     Raises:
         FitRefused: no shape of the family is at the stated place, and there is no contact.
@@ -63,7 +58,7 @@ def reconstruct_with_prior(evidence: ShapeEvidence, settings: FamilySettings | N
     """
     if not evidence.contacts:
         with suppress(FitRefused):  # the prior may not apply
-            return by_glanced_surface(evidence)
+            return choose(None, None, by_glanced_surface(evidence))
     return reconstruct(evidence, settings)
 
 
@@ -74,7 +69,7 @@ def reconstruct(
 
     Args:
         evidence: one contact or a silhouette at least.
-        settings: how much of the family is searched; the default level where not given.
+        settings: amount of search; the default level where not given.
         previous: answer of this function from fewer readings of the same object; the search begins at its
             hypotheses too.
 
@@ -89,23 +84,27 @@ def reconstruct(
         fit = (
             _search(evidence, settings, smooth)
             if previous is None
-            else _continue(evidence, settings, previous, smooth)
+            else _continue(evidence, settings, _hypotheses_of(previous), smooth)
         )
     except FitRefused:
         if smooth is None:
             raise
         return choose(None, smooth, None)
     found = choose(fit, smooth, None)
-    seconds = fit.estimate.seconds + (0.0 if smooth is None else smooth.estimate.seconds)
-    if smooth is None or found.mesh is not smooth.estimate.mesh:
-        return replace(found, seconds=seconds)
-    details = {**found.details, LEFT: fit.estimate.details["hypotheses"]}
-    return replace(found, seconds=seconds, details=details)
+    if isinstance(found, SmoothFit):
+        found = replace(found, rejected=fit)
+    return replace(found, seconds=fit.seconds + (0.0 if smooth is None else smooth.seconds))
 
 
-def _smooth(evidence: ShapeEvidence) -> Candidate | None:
-    """The smooth surface that predicts left-out contacts best; None where there is none."""
-    found: list[Candidate] = []
+def _hypotheses_of(previous: ShapeEstimate) -> tuple[Hypothesis, ...]:
+    """Hypotheses of the family in an answer, or those that it was preferred to."""
+    fit = previous.rejected if isinstance(previous, SmoothFit) else previous
+    return fit.mixture.hypotheses if isinstance(fit, FamilyFit) else ()
+
+
+def _smooth(evidence: ShapeEvidence) -> SmoothFit | None:
+    """Fit the smooth surface that predicts left-out contacts best; None where there is none."""
+    found: list[SmoothFit] = []
     if not evidence.contacts:
         return None
     if evidence.sighted:
@@ -114,88 +113,77 @@ def _smooth(evidence: ShapeEvidence) -> Candidate | None:
             found.append(bend_prior(evidence))
     if not found or len(evidence.contacts) >= MIN_CONTACTS:
         with suppress(OutOfDomain):  # contacts and free space may contradict each other
-            surface = by_hermite(evidence, symmetric=False)  # every class of round bodies is in the family
-            found.append(Candidate(surface, np.array(surface.details["left_out_m"])))
-    shown = [replace(one, outline_error=outline_error(one.estimate.mesh, evidence.look)) for one in found]
+            found.append(by_hermite(evidence, symmetric=False))  # the family has all classes of round bodies
+    shown = [replace(one, outline_error=outline_error(one.mesh, evidence.look)) for one in found]
     best = min((one.outline_error for one in shown), default=0.0)
     alike = [one for one in shown if one.outline_error <= best + MAX_OUTLINE_ERROR]
     return min(alike, key=lambda one: one.misfit, default=None)
 
 
-def _search(evidence: ShapeEvidence, settings: FamilySettings, smooth: Candidate | None) -> Candidate:
-    """The family's best candidate of one to three searches, each by draws of its own.
+def _search(evidence: ShapeEvidence, settings: FamilySettings, smooth: SmoothFit | None) -> FamilyFit:
+    """Fit the family by one to three searches, each with its own draws, and return the best fit.
 
     More searches are made of what fits poorly, of several classes that fit alike, and without a picture,
     where the cost has more local minima. Of good fits the least cost is taken, of poor ones the least contact
     residual.
     """
-    best = _candidate(family_estimate(evidence, settings), evidence)
-    seconds = best.estimate.seconds
+    best = _fit(evidence, settings)
+    seconds = best.seconds
     many = len(evidence.contacts) >= MIN_CONTACTS
     least = 1 if evidence.sighted or not many else BLIND_SEARCHES
     for more in range(1, SEARCHES):
-        classes = best.estimate.details["classes"]
-        assert isinstance(classes, Mapping)
-        rivals = sum(weight >= RIVAL for weight in classes.values())
-        unsure = rivals > 1 if many else _strain_of(best) > UNEASY
+        rivals = sum(weight >= RIVAL for weight in best.mixture.by_class().values())
+        unsure = rivals > 1 if many else best.nuisance.cost > UNEASY
         again = _is_poor(best) or (more == least and unsure)
         if more >= least and not again:
             break
-        found = _candidate(family_estimate(evidence, replace(settings, seed=settings.seed + more)), evidence)
-        seconds += found.estimate.seconds
+        found = _fit(evidence, replace(settings, seed=settings.seed + more))
+        seconds += found.seconds
         best = min(best, found, key=_rank)
     return _with_predictions(best, evidence, smooth, seconds)
 
 
 def _continue(
-    evidence: ShapeEvidence, settings: FamilySettings, previous: ShapeEstimate, smooth: Candidate | None
-) -> Candidate:
-    """The family's candidate from another's hypotheses; of a poor fit by a new search beside them."""
-    found = _candidate(family_estimate(evidence, settings, (previous,)), evidence)
-    found = _with_predictions(found, evidence, smooth, found.estimate.seconds)
+    evidence: ShapeEvidence,
+    settings: FamilySettings,
+    seeds: Sequence[Hypothesis],
+    smooth: SmoothFit | None,
+) -> FamilyFit:
+    """Fit the family from earlier hypotheses; repeat a poor fit by a new search next to its hypotheses."""
+    found = _fit(evidence, settings, seeds)
+    found = _with_predictions(found, evidence, smooth, found.seconds)
     if not _is_poor(found) and rejection_reason(found, smooth) is None:
         return found
-    again = family_estimate(evidence, replace(ANEW, seed=settings.seed), (found.estimate,))
-    seconds = found.estimate.seconds + again.seconds
-    return _with_predictions(_candidate(again, evidence), evidence, smooth, seconds)
+    again = _fit(evidence, replace(ANEW, seed=settings.seed), found.mixture.hypotheses)
+    return _with_predictions(again, evidence, smooth, found.seconds + again.seconds)
 
 
-def _candidate(found: ShapeEstimate, evidence: ShapeEvidence) -> Candidate:
-    """A family's estimate with its outline compared; left-out contacts are predicted for the best alone."""
-    nothing = np.zeros(len(evidence.contacts))
-    return Candidate(
-        found, nothing, outline_error(found.mesh, evidence.look), open_without_class(evidence, found.mesh)
-    )
+def _fit(evidence: ShapeEvidence, settings: FamilySettings, seeds: Sequence[Hypothesis] = ()) -> FamilyFit:
+    """Fit the family once, and compare the surface with the outline."""
+    fit = fit_family(evidence, settings, seeds)
+    error, free = outline_error(fit.mesh, evidence.look), open_without_class(evidence, fit.mesh)
+    return replace(fit, outline_error=error, open_axes=free)
 
 
 def _with_predictions(
-    found: Candidate, evidence: ShapeEvidence, smooth: Candidate | None, seconds: float
-) -> Candidate:
-    estimate = replace(found.estimate, seconds=seconds)
-    if smooth is None or rejection_reason(found, None) is not None:
-        return replace(found, estimate=estimate)
-    return replace(found, estimate=estimate, left_out=predict_left_out(estimate, evidence))
+    fit: FamilyFit, evidence: ShapeEvidence, smooth: SmoothFit | None, seconds: float
+) -> FamilyFit:
+    """Predict left-out contacts where the smooth surface competes with a fit that is not yet rejected."""
+    fit = replace(fit, seconds=seconds)
+    if smooth is None or rejection_reason(fit, None) is not None:
+        return fit
+    return replace(fit, left_out=predict_left_out(fit, evidence))
 
 
-def _is_poor(found: Candidate) -> bool:
-    """True where the shape fits contacts or outline poorly, or only on a bench that is off."""
-    typical = found.estimate.details["contact_cost"]
-    assert isinstance(typical, float)
-    return typical > LOOSE or _strain_of(found) > STRAINED or found.outline_error > MAX_OUTLINE_ERROR
+def _is_poor(fit: FamilyFit) -> bool:
+    """True where the shape fits contacts or outline poorly, or needs excessive bench errors."""
+    return fit.contact_cost > LOOSE or fit.nuisance.is_excessive or fit.outline_error > MAX_OUTLINE_ERROR
 
 
-def _strain_of(found: Candidate) -> float:
-    strain = found.estimate.details["strain"]
-    assert isinstance(strain, float)
-    return strain
-
-
-def _rank(found: Candidate) -> tuple[bool, float]:
+def _rank(fit: FamilyFit) -> tuple[bool, float]:
     """Good fits go before poor ones, by their cost; poor ones by their contact residual."""
-    poor = _is_poor(found)
-    cost = found.estimate.details["contact_cost" if poor else "cost"]
-    assert isinstance(cost, float)
-    return poor, cost
+    poor = _is_poor(fit)
+    return poor, fit.contact_cost if poor else fit.mixture.best.cost
 
 
 HYPOTHESES, ROUNDS = 3, 10
@@ -208,28 +196,23 @@ _BORDER = 1.0
 """Pixels that a rendered border and a mask's differ by besides the camera's error."""
 
 
-def predict_left_out(found: ShapeEstimate, evidence: ShapeEvidence) -> FloatArray:
+def predict_left_out(fit: FamilyFit, evidence: ShapeEvidence) -> FloatArray:
     """Fit the family's hypotheses without each part of the contacts, and measure those that were left out.
 
     Args:
-        found: by the family; its hypotheses are where each fit begins.
-        evidence: that it was found from.
+        fit: of the family; its hypotheses are where each fit begins.
+        evidence: readings that it was fitted to.
 
     Returns:
         ``(contacts,)`` rms distance of each from the surface fitted and bent to the others, m.
     """
     contacts = evidence.contacts
-    stated: Sequence[Mapping[str, Any]] = found.details["hypotheses"]  # type: ignore[assignment]
     errors = np.zeros(len(contacts))
     for fold in folds_of(len(contacts)):
         kept = evidence.without(fold)
         search = FamilySearch(kept, FamilySettings())
-        fits = []
-        for one in stated[:HYPOTHESES]:
-            code, numbers = np.array(one["code"], np.int64), np.array(one["numbers"], np.float64)
-            begun = FamilyShape(str(one["class"]), code, numbers)
-            hypothesis = search.seeded(begun, np.array(one["drawn_about"]))
-            fits.append(search.refined(hypothesis, ROUNDS, last=True))
+        begun = [search.seeded(one.shape, one.prior.middle) for one in fit.mixture.hypotheses[:HYPOTHESES]]
+        fits = [search.refined(one, ROUNDS, last=True) for one in begun]
         shape = min(fits, key=lambda one: one.cost).shape
         bent_to = moved_points(shape, kept, np.ones(len(kept.contacts), bool))
         typical = contact_fit(shape, search.full).typical

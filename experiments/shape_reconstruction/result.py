@@ -86,7 +86,7 @@ def _estimate(sense: str, found: ShapeEstimate, truth: Mesh | None, seconds: flo
         "not_bounded": list(found.not_bounded),
         "doubtful_m": {str(index): float(off) for index, off in found.doubtful.items()},
         "flags": list(found.flags),
-        "details": dict(found.details),
+        "details": found.details(),
         "mesh": f"{stem_of(sense)}.ply",
         "seconds": seconds,
         "refused": None,

@@ -1,4 +1,4 @@
-"""What an estimator of shape hands on: a watertight surface that says how well each part of it is known."""
+"""The result of an estimator of shape: a watertight surface with the uncertainty of each of its parts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,6 +22,11 @@ class ShapeEstimate:
     doubtful: Mapping[int, float]
     """indices of the touches that do not fit the rest, with m that each is off."""
     flags: tuple[str, ...]  #: short sentences that the answer must carry: ``"class unknown: mug or can"``.
-    seconds: float  #: of the estimate.
-    details: Mapping[str, object] = field(default_factory=dict)
-    """JSON values of what the estimator found beside: its kind, parameters, other hypotheses."""
+    seconds: float  #: duration of the estimate.
+    estimator: str  #: name of the estimator.
+    counts: Mapping[str, int] = field(default_factory=dict)
+    """numbers of readings and points that it is made from, by their names in the result."""
+
+    def details(self) -> dict[str, object]:
+        """Return JSON values of the result besides the surface."""
+        return {"estimator": self.estimator, **self.counts}

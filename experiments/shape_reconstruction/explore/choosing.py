@@ -5,7 +5,6 @@ by its weight; the risk is the mean distance by which answers are judged, less t
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -15,6 +14,7 @@ from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
 from experiments.shape_reconstruction.family.rays import first_met
+from experiments.shape_reconstruction.fits import FamilyFit
 from experiments.shape_reconstruction.section import Choice
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray, IntArray
@@ -108,18 +108,18 @@ def error_spared(evidence: ShapeEvidence, estimate: ShapeEstimate, lines: FloatA
         lines: ``(n, 4, 4)`` ``stand_from_gel`` at the ends of lines along their z.
 
     Returns:
-        ``(n,)`` m, none negative; None where the estimate has no hypotheses, or they are alike.
+        ``(n,)`` m, none negative; None where the estimate is not of the family, or its hypotheses are alike.
     """
-    shapes, shares = [], []
-    stated: Sequence[Any] = estimate.details.get("hypotheses", ())  # type: ignore[assignment]
-    about = SHAPES // max(len(stated), 1)
-    for one in stated:
-        every = [one["numbers"], *one.get("about", ())[:about]]
-        code: IntArray = np.array(one["code"], dtype=np.int64)
-        shapes += [FamilyShape(one["class"], code, np.array(numbers)) for numbers in every]
-        shares += [one["weight"] / len(every)] * len(every)
-    if not shapes:
+    if not isinstance(estimate, FamilyFit):
         return None
+    shapes: list[FamilyShape] = []
+    shares: list[float] = []
+    mixture = estimate.mixture
+    count = SHAPES // len(mixture.hypotheses)
+    for one, weight, about in zip(mixture.hypotheses, mixture.weights, mixture.about, strict=True):
+        every = [one.shape, *about[:count]]
+        shapes += every
+        shares += [float(weight) / len(every)] * len(every)
     weights, apart = np.array(shares), distances_apart(shapes)
     now = bayes_risk(weights, apart)
     if now < AGREE:

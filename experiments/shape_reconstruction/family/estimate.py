@@ -1,7 +1,7 @@
 """The shape of an object by the family: household shapes that the readings allow, and the surface between."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,16 +20,17 @@ from experiments.shape_reconstruction.family.contact_fit import (
 )
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import corners_of, median_surface
-from experiments.shape_reconstruction.family.freedom import Strain
+from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
 from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
 from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
+from experiments.shape_reconstruction.fits import FamilyFit
 from experiments.shape_reconstruction.smooth.contact_samples import all_samples
 from experiments.shape_reconstruction.smooth.free_space import silhouette_of
 from experiments.shape_reconstruction.smooth.knowledge import beyond_deviation, limited_sides
 from experiments.shape_reconstruction.smooth.knowledge import not_bounded as open_axes
 from experiments.shape_reconstruction.smooth.stated_space import TOO_LONG, longest_side, max_offset
-from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
+from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.errors import FitRefused, OutOfDomain
 from harness.basics.geometry import apply, inverse
@@ -73,25 +74,22 @@ SLIPPING = 0.15
 FINER = "if they did not slip, a finer search may fit them: shape.method=family-fine, in thrice family's time"
 """Said where several contacts do not fit: a search may have missed the shape."""
 
-LEFT = "hypotheses_left"
-"""In the details of an answer that is not the family's: hypotheses of the family that fitted ill."""
-
 RIVAL = 0.2
 """Weight of a second class above which the class is unknown."""
 
 
-def family_estimate(
-    evidence: ShapeEvidence, settings: FamilySettings | None = None, previous: Sequence[ShapeEstimate] = ()
-) -> ShapeEstimate:
-    """The median surface of the household shapes that the readings allow, moved to its contacts.
+def fit_family(
+    evidence: ShapeEvidence, settings: FamilySettings | None = None, seeds: Sequence[Hypothesis] = ()
+) -> FamilyFit:
+    """Compute the median surface of the hypotheses that the readings allow, moved to its contacts.
 
     Args:
         evidence: one contact or a silhouette at least.
-        settings: how much is searched; the default level where not given.
-        previous: estimates by this function of the same object, of fewer or other readings: the search begins
-            at their hypotheses as well.
+        settings: amount of search; the default level where not given.
+        seeds: hypotheses of earlier fits of the same object, where the search begins as well.
 
     Raises:
+        FitRefused: no hypothesis is at the stated place and of the stated size.
         OutOfDomain: nothing was touched or seen.
     """
     began = time.perf_counter()
@@ -102,37 +100,37 @@ def family_estimate(
             "contact or one silhouette: press at the object, or take its picture"
         )
     search = FamilySearch(evidence, settings)
-    seeds = [seed for estimate in previous for seed in _seeds_of(search, estimate)]
-    hypotheses = _at_stated_place(search.found(seeds), evidence)
+    started = [search.seeded(seed.shape, seed.prior.middle) for seed in seeds]
+    hypotheses = _at_stated_place(search.found(started), evidence)
     mixture = mixture_of(hypotheses, evidence.sighted, bool(evidence.contacts), settings.seed)
     turned = turned_contacts(mixture.best.shape, evidence)
-    fit, strain = contact_fit(mixture.best.shape, search.full), search.strain(mixture.best.shape)
+    fit, nuisance = contact_fit(mixture.best.shape, search.full), search.nuisance(mixture.best.shape)
     fit = replace(fit, doubtful=fit.doubtful | (turned > 0.0))
     rejected = _outliers(fit)
     touched = np.concatenate([np.empty((0, 3)), *(touch.points for touch in evidence.contacts)])
     body = median_surface(mixture, settings.pitch, touched)
     plain = body.mesh
     mesh = _warped(plain, mixture.best.shape, evidence, fit)
-    doubtful = {
-        touch.index: float(off)
-        for touch, off, bad in zip(evidence.contacts, fit.off, rejected, strict=True)
-        if bad
-    }
-    found = ShapeEstimate(
+    found = FamilyFit(
         mesh=mesh,
         deviation=_deviation(plain, mixture, mesh, fit, evidence.sighted),
         known_by=known_by(mesh.vertices, evidence),
-        not_bounded=not_bounded(evidence, mesh, fit.typical > LOOSE or strain.beyond_belief),
-        doubtful=doubtful,
-        flags=(*_flags(evidence, mixture, fit, strain, turned, settings), *body.notes),
-        seconds=time.perf_counter() - began,
-        details={
-            **_details(mixture, fit),
-            "strain": strain.cost,
-            "strained": strain.beyond_belief,
-            "sighted": evidence.sighted,
-            "beyond_m": float(np.linalg.norm(beyond_contacts(mesh.vertices, evidence), axis=1).mean()),
+        not_bounded=not_bounded(evidence, mesh, fit.typical > LOOSE or nuisance.is_excessive),
+        doubtful={
+            touch.index: float(off)
+            for touch, off, bad in zip(evidence.contacts, fit.off, rejected, strict=True)
+            if bad
         },
+        flags=(*_flags(evidence, mixture, fit, nuisance, turned, settings), *body.notes),
+        seconds=time.perf_counter() - began,
+        estimator="family",
+        left_out=np.zeros(len(evidence.contacts)),
+        mixture=mixture,
+        contact_cost=fit.typical,
+        other_cost=fit.others,
+        nuisance=nuisance,
+        beyond_contacts=float(np.linalg.norm(beyond_contacts(mesh.vertices, evidence), axis=1).mean()),
+        sighted=evidence.sighted,
     )
     return found if evidence.contacts else _by_picture_alone(found, evidence)
 
@@ -161,7 +159,7 @@ def _at_stated_place(hypotheses: list[Hypothesis], evidence: ShapeEvidence) -> l
     return kept
 
 
-def _by_picture_alone(found: ShapeEstimate, evidence: ShapeEvidence) -> ShapeEstimate:
+def _by_picture_alone(found: FamilyFit, evidence: ShapeEvidence) -> FamilyFit:
     """The same, as unsure of its depth along the line of sight as one outline leaves it."""
     sides = limited_sides(found.mesh, None, silhouette_of(evidence, np.zeros((0, 3))))
     beyond = beyond_deviation(found.mesh, found.known_by, sides, evidence.largest)
@@ -171,15 +169,6 @@ def _by_picture_alone(found: ShapeEstimate, evidence: ShapeEvidence) -> ShapeEst
         not_bounded=open_axes(sides),
         flags=(*found.flags, "by the picture alone: its depth along the line of sight is supposed"),
     )
-
-
-def _seeds_of(search: FamilySearch, estimate: ShapeEstimate) -> Iterator[Hypothesis]:
-    """Hypotheses of an earlier estimate, or those that it left as they fitted ill; else none."""
-    listed = estimate.details.get("hypotheses", estimate.details.get(LEFT, ()))
-    assert isinstance(listed, Sequence)
-    for one in listed:
-        code, numbers = np.array(one["code"], np.int64), np.array(one["numbers"], np.float64)
-        yield search.seeded(FamilyShape(str(one["class"]), code, numbers), np.array(one["drawn_about"]))
 
 
 def _warped(mesh: Mesh, shape: FamilyShape, evidence: ShapeEvidence, fit: ContactFit) -> Mesh:
@@ -219,7 +208,7 @@ def _flags(
     evidence: ShapeEvidence,
     mixture: Mixture,
     fit: ContactFit,
-    strain: Strain,
+    nuisance: NuisanceCost,
     turned: FloatArray,
     settings: FamilySettings,
 ) -> list[str]:
@@ -232,8 +221,8 @@ def _flags(
         flags.append(
             f"outside the family: contacts are {np.median(fit.off) * 1e3:.1f} mm off the nearest such shape"
         )
-    if strain.beyond_belief:
-        flags.append(f"outside the family: such a shape fits with {strain.most}")
+    if nuisance.is_excessive:
+        flags.append(f"outside the family: such a shape fits with {nuisance.largest}")
     listed = ", ".join(
         f"{touch.index} ({1e3 * gap:.1f} mm)"
         for touch, gap, bad in zip(evidence.contacts, fit.off, fit.doubtful, strict=True)
@@ -256,28 +245,6 @@ def _flags(
     if angles:
         flags.append(f"contacts whose pose is turned against the rest: {', '.join(angles)}")
     return flags
-
-
-def _details(mixture: Mixture, fit: ContactFit) -> dict[str, object]:
-    return {
-        "kind": "family",
-        "classes": mixture.by_class(),
-        "cost": mixture.best.cost,
-        "contact_cost": fit.typical,
-        "other_cost": fit.others,
-        "hypotheses": [
-            {
-                "class": one.shape.name,
-                "weight": float(weight),
-                "cost": one.cost,
-                "code": one.shape.code.tolist(),
-                "numbers": one.shape.theta.tolist(),
-                "about": [shape.theta.tolist() for shape in about],
-                "drawn_about": one.prior.middle.tolist(),
-            }
-            for one, weight, about in zip(mixture.hypotheses, mixture.weights, mixture.about, strict=True)
-        ],
-    }
 
 
 UNDER_GEL = 6.0e-3

@@ -205,11 +205,11 @@ def stand_rows(code: IntArray) -> FloatArray:
     return np.array(rows)
 
 
-STRAINED = 20.0
-"""Half the sum of squares of some twelve numbers, in standard deviations, above which a shape does not fit.
-Right answers by presses and a picture have up to 17, wrong ones of hammers, scissors and bananas 21 to 88."""
+MAX_NUISANCE_COST = 20.0
+"""Half the sum of squares of some twelve bench errors, in standard deviations: no calibrated bench has more
+(docs/results/shape.md)."""
 
-_SAYS = {
+_NAMES = {
     layout.X: ("its place", "mm", 1e3),
     layout.Y: ("its place", "mm", 1e3),
     layout.LIFT: ("its support's height", "mm", 1e3),
@@ -223,34 +223,34 @@ _SAYS = {
     layout.GEL + 1: ("the gel's place", "mm", 1e3),
     layout.GEL + 2: ("the gel's place", "mm", 1e3),
 }
-"""What each number is, in which unit, and what it is multiplied by for that."""
+"""Name, unit, and factor to that unit, of each bench error."""
 
 
 @dataclass(frozen=True)
-class Strain:
-    """What a shape asks of the bench."""
+class NuisanceCost:
+    """Cost of the bench errors that a shape needs to fit."""
 
     cost: float  #: half the sum of squares, in standard deviations.
-    most: str  #: what is off by the most of them, in words.
+    largest: str  #: the largest of the errors, in words.
 
     @property
-    def beyond_belief(self) -> bool:
-        """Whether no calibrated bench is off by so much."""
-        return self.cost > STRAINED
+    def is_excessive(self) -> bool:
+        """True if no calibrated bench has such errors."""
+        return self.cost > MAX_NUISANCE_COST
 
 
-def strain_of(theta: FloatArray, rows: FloatArray, middle: FloatArray) -> Strain:
-    """Of a shape's vector.
+def nuisance_cost(theta: FloatArray, rows: FloatArray, middle: FloatArray) -> NuisanceCost:
+    """Compute the cost of the bench errors in a shape's vector.
 
     Args:
-        theta: ``(SIZE,)``.
-        rows: ``(n, SIZE)``, each of one of the bench's numbers over its standard deviation.
-        middle: ``(SIZE,)`` that they are expected to be.
+        theta: ``(SIZE,)`` vector of the shape.
+        rows: ``(n, SIZE)``, each one bench error over its standard deviation.
+        middle: ``(SIZE,)`` expected vector.
     """
     off = rows @ (theta - middle)
     most = int(np.argmax(np.abs(off)))
     slot = int(np.flatnonzero(rows[most])[0])
-    name, unit, factor = _SAYS[slot]
+    name, unit, factor = _NAMES[slot]
     by = factor * abs(theta[slot] - middle[slot])
-    said = f"{name} off by {by:.1f} {unit}, {abs(off[most]):.0f} standard deviations"
-    return Strain(0.5 * float(off @ off), said)
+    largest = f"{name} off by {by:.1f} {unit}, {abs(off[most]):.0f} standard deviations"
+    return NuisanceCost(0.5 * float(off @ off), largest)

@@ -1,4 +1,4 @@
-"""How much each hypothesis is believed, and shapes drawn from the uncertainty about each."""
+"""Weights of the hypotheses, and shapes sampled from the uncertainty of each."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ _LONGEST = 2.5
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """What the readings leave."""
+    """The posterior: hypotheses with weights, and samples of each."""
 
     hypotheses: tuple[Hypothesis, ...]  #: by weight, the greatest first.
     weights: FloatArray  #: ``(n,)``, their sum 1.
@@ -44,6 +44,21 @@ class Mixture:
             name = names.setdefault(one.shape.code.tobytes(), one.shape.name)
             totals[name] = totals.get(name, 0.0) + float(weight)
         return dict(sorted(totals.items(), key=lambda item: -item[1]))
+
+    def as_json(self) -> list[dict[str, object]]:
+        """Return the hypotheses as JSON values."""
+        return [
+            {
+                "class": one.shape.name,
+                "weight": float(weight),
+                "cost": one.cost,
+                "code": one.shape.code.tolist(),
+                "numbers": one.shape.theta.tolist(),
+                "about": [shape.theta.tolist() for shape in about],
+                "drawn_about": one.prior.middle.tolist(),
+            }
+            for one, weight, about in zip(self.hypotheses, self.weights, self.about, strict=True)
+        ]
 
 
 def mixture_of(found: list[Hypothesis], sighted: bool, touched: bool, seed: int) -> Mixture:

@@ -18,13 +18,13 @@ from experiments.shape_reconstruction.family.classes import (
 )
 from experiments.shape_reconstruction.family.freedom import (
     OUTLINE_BIAS,
-    Strain,
+    NuisanceCost,
     basis_of,
     bench_rows,
+    nuisance_cost,
     shape_rows,
     stand_basis,
     stand_rows,
-    strain_of,
 )
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
 from experiments.shape_reconstruction.family.proposals import Guides, beside, changes, guides_of, lay
@@ -221,9 +221,9 @@ class FamilySearch:
         rows = np.concatenate([self._bench, shape_rows(shape.code)])
         return Hypothesis(shape, PriorRows(self._middle(middle), rows), np.inf, np.empty((0, 0)))
 
-    def strain(self, shape: FamilyShape) -> Strain:
-        """What a shape asks of the bench."""
-        return strain_of(shape.theta, self._bench, self._bench_middle)
+    def nuisance(self, shape: FamilyShape) -> NuisanceCost:
+        """Compute the cost of the bench errors that a shape needs."""
+        return nuisance_cost(shape.theta, self._bench, self._bench_middle)
 
     def _changed(self, one: Hypothesis, shape: FamilyShape) -> Hypothesis:
         """Another shape beside a hypothesis: what they share is believed as before, not as it was fitted."""

@@ -57,7 +57,8 @@ def by_glanced_surface(evidence: ShapeEvidence) -> ShapeEstimate:
             *body.notes,
         ),
         seconds=time.perf_counter() - start,
-        details={"estimator": "glance", "points": len(points)},
+        estimator="glance",
+        counts={"points": len(points)},
     )
 
 

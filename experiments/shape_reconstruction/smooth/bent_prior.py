@@ -9,15 +9,14 @@ from scipy import ndimage
 from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial.distance import cdist
 
-from experiments.shape_reconstruction.choice import Candidate, folds_of
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
+from experiments.shape_reconstruction.fits import SmoothFit, folds_of
 from experiments.shape_reconstruction.prior.network import shipped, silhouette_to_glance_at
 from experiments.shape_reconstruction.prior.surface import BLUR, closing_field, prior_deviation
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
 from experiments.shape_reconstruction.smooth.free_space import CLEARANCE, Silhouette, sensor_depth
 from experiments.shape_reconstruction.smooth.grid import Grid
 from experiments.shape_reconstruction.smooth.knowledge import known_by, limited_sides, not_bounded
-from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray, IntArray, read_only
 
 AMPLITUDE, LENGTH = 6.0e-3, 20.0e-3
@@ -48,7 +47,7 @@ class _Data:
     on_surface: IntArray  #: ``(n,)`` whether it is a place that was touched.
 
 
-def bend_prior(evidence: ShapeEvidence) -> Candidate:
+def bend_prior(evidence: ShapeEvidence) -> SmoothFit:
     """Bend the single-view prior to the contacts, within the visual hull and the free space.
 
     The signed distance of the prior's surface is the mean of a Gaussian process; contacts correct it nearby.
@@ -81,7 +80,7 @@ def bend_prior(evidence: ShapeEvidence) -> Candidate:
     between = _covariance(body.mesh.vertices, data.points)
     explained = np.einsum("ij,ji->i", between, cho_solve(precision, between.T)) / AMPLITUDE**2
     unsure = max(prior_error, float(np.sqrt(np.mean(left_out**2))))
-    estimate = ShapeEstimate(
+    return SmoothFit(
         mesh=body.mesh,
         deviation=np.hypot(unsure * np.sqrt(np.clip(1.0 - explained, 0.0, 1.0)), READING),
         known_by=known,
@@ -89,9 +88,10 @@ def bend_prior(evidence: ShapeEvidence) -> Candidate:
         doubtful={},
         flags=body.notes,
         seconds=time.perf_counter() - start,
-        details={"estimator": "bent prior", "contacts": len(evidence.contacts)},
+        estimator="bent prior",
+        counts={"contacts": len(evidence.contacts)},
+        left_out=left_out,
     )
-    return Candidate(estimate, left_out)
 
 
 @lru_cache(maxsize=4)

@@ -13,6 +13,7 @@ from scipy.linalg import cho_solve
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.fits import SmoothFit
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
 from experiments.shape_reconstruction.smooth.free_space import (
     CLEARANCE,
@@ -36,7 +37,6 @@ from experiments.shape_reconstruction.smooth.revolution import (
     turned_room,
 )
 from experiments.shape_reconstruction.smooth.thin_plate import SurfaceData, ThinPlateField, fitted
-from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
 
@@ -105,7 +105,24 @@ class _Bounds:
         return np.concatenate([self.places, foot])
 
 
-def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> ShapeEstimate:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RbfFit(SmoothFit):
+    """The zero surface of a thin-plate field."""
+
+    amplitude: float  #: scale of the field's covariance.
+    axis: Revolution | None  #: axis that contacts are rotated about; None without one.
+
+    def details(self) -> dict[str, object]:
+        """Return JSON values of the result besides the surface."""
+        return {
+            **super().details(),
+            "amplitude": self.amplitude,
+            "left_out_m": self.left_out.tolist(),
+            "axis_m": None if self.axis is None else [float(value) for value in self.axis.centre],
+        }
+
+
+def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> RbfFit:
     """The zero of a thin-plate field through the contacts, cut by all that is known to be free.
 
     Args:
@@ -166,7 +183,7 @@ class _Fit:
     left_out: LeftOut
 
 
-def _finished(fit: _Fit, mesh: Mesh, start: float) -> ShapeEstimate:
+def _finished(fit: _Fit, mesh: Mesh, start: float) -> RbfFit:
     known = known_by(mesh, fit.samples, fit.silhouette)
     sides = limited_sides(mesh, fit.samples, fit.silhouette)
     beyond = beyond_deviation(mesh, known, sides, fit.evidence.largest)
@@ -181,7 +198,7 @@ def _finished(fit: _Fit, mesh: Mesh, start: float) -> ShapeEstimate:
     open_ = (
         "may be hollow: its top was touched nowhere near its middle" if (hollow > 0.0).mean() > _MOUTH else ""
     )
-    return ShapeEstimate(
+    return RbfFit(
         mesh=mesh,
         deviation=np.sqrt(smooth**2 + READING**2 + beyond**2 + hollow**2),
         known_by=known,
@@ -189,13 +206,11 @@ def _finished(fit: _Fit, mesh: Mesh, start: float) -> ShapeEstimate:
         doubtful=fit.left_out.outliers,
         flags=tuple(flag for flag in (round_, open_) if flag),
         seconds=time.perf_counter() - start,
-        details={
-            "estimator": "rbf",
-            "contacts": len(fit.evidence.contacts),
-            "amplitude": fit.field.amplitude,
-            "left_out_m": fit.left_out.errors.tolist(),
-            "axis_m": None if fit.axis is None else [float(value) for value in fit.axis.centre],
-        },
+        estimator="rbf",
+        counts={"contacts": len(fit.evidence.contacts)},
+        left_out=fit.left_out.errors,
+        amplitude=fit.field.amplitude,
+        axis=fit.axis,
     )
 
 

@@ -33,11 +33,10 @@ def test_the_object_itself_is_found_at_any_size_turn_and_place(name: str, scale:
     drawn = build(name, 8e-3)
     truth = Mesh(scale * drawn.vertices @ turn.T + [0.02, -0.01, 0.0], drawn.faces)
     answer = by_retrieval(evidence_of(presses(truth, 24, seed=1), look_at(truth)), LIBRARY)
-    shapes = answer.details["shapes"]
-    assert isinstance(shapes, list)
-    assert shapes[0]["name"] == name
+    best = answer.ranked[0]
+    assert best.shape.name == name
     longest = scale * float(np.ptp(drawn.vertices, axis=0).max())
-    assert shapes[0]["size_m"] == pytest.approx(longest, rel=0.05)
+    assert best.size == pytest.approx(longest, rel=0.05)
     assert shape_error(answer.mesh, truth, samples=3000).chamfer < 2.5e-3
     assert trimesh.Trimesh(answer.mesh.vertices, answer.mesh.faces, process=False).is_watertight
     assert np.isfinite(answer.deviation).all()
@@ -46,8 +45,7 @@ def test_the_object_itself_is_found_at_any_size_turn_and_place(name: str, scale:
 def test_without_the_object_the_answer_is_less_sure_and_costs_more() -> None:
     evidence = evidence_of(presses(build("mug", 8e-3), 24, seed=1))
     known, strange = by_retrieval(evidence, LIBRARY), by_retrieval(evidence, LIBRARY[1:])
-    costs = [one.details["shapes"] for one in (known, strange)]
-    assert costs[0][0]["cost"] < costs[1][0]["cost"]  # type: ignore[index]
+    assert known.ranked[0].cost < strange.ranked[0].cost
     assert np.median(strange.deviation) > np.median(known.deviation)
 
 

@@ -1,6 +1,7 @@
 """Acceptance rules: which candidate answers, what it states, and why the other does not."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,38 +10,39 @@ from experiments.shape_reconstruction.choice import (
     ASSUMED_DEVIATION,
     BLIND_CONTACTS,
     FAMILY_ODDS,
-    FOLDS,
     MAX_BEYOND,
     MAX_OUTLINE_ERROR,
     MIN_CONTACTS,
-    PREDICTION_SCALE,
-    Candidate,
     choose,
-    folds_of,
 )
-from experiments.shape_reconstruction.surface import SUPPOSED, TOUCHED, ShapeEstimate
-from harness.basics.mesh import Mesh
+from experiments.shape_reconstruction.family.classes import draw_shape
+from experiments.shape_reconstruction.family.freedom import MAX_NUISANCE_COST, NuisanceCost
+from experiments.shape_reconstruction.fits import FOLDS, PREDICTION_SCALE, FamilyFit, SmoothFit, folds_of
+from tests.support.family_shapes import family_fit, mixture_of
 
 DEVIATION = 1.0e-3
+EXCESSIVE = NuisanceCost(1.1 * MAX_NUISANCE_COST, "")
 
 
-def estimate(name: str, **details: object) -> ShapeEstimate:
-    """Two vertices, the second of them touched."""
-    told = {"estimator": name, "strained": False, "sighted": True, "beyond_m": 0.0, **details}
-    mesh = Mesh(np.zeros((2, 3)), np.zeros((0, 3), np.int64))
-    known = np.array([SUPPOSED, TOUCHED])
-    return ShapeEstimate(mesh, np.full(2, DEVIATION), known, (), {}, (name,), 0.0, told)
+def fit_of(contacts: int, error: float = 0.0, **changes: Any) -> FamilyFit:
+    can = draw_shape("can", np.random.default_rng(0))
+    return family_fit(
+        mixture_of(can), left_out=np.full(contacts, error), open_axes=("x",), flags=("family",), **changes
+    )
 
 
-def candidate(name: str, contacts: int, error: float = 0.0, **details: object) -> Candidate:
-    return Candidate(estimate(name, **details), np.full(contacts, error), open_axes=("x",))
+def smooth_of(contacts: int, error: float = 0.0) -> SmoothFit:
+    fit = fit_of(contacts)
+    return SmoothFit(
+        fit.mesh, fit.deviation, fit.known_by, (), {}, (), 0.0, "smooth", left_out=np.full(contacts, error)
+    )
 
 
-PRIOR = estimate("prior")
+PRIOR = replace(smooth_of(0), estimator="prior")
 
 
 def test_without_a_contact_the_prior_answers_and_the_family_where_there_is_none() -> None:
-    fit = candidate("family", 0)
+    fit = fit_of(0)
     assert choose(fit, None, PRIOR) is PRIOR
     assert choose(fit, None, None).flags[0] == "family"
 
@@ -57,8 +59,8 @@ def test_without_a_contact_the_prior_answers_and_the_family_where_there_is_none(
 def test_what_predicts_left_out_contacts_better_answers_from_the_first_contact_on(
     contacts: int, fit: float, smooth: float, by: str
 ) -> None:
-    found = choose(candidate("family", contacts, fit), candidate("smooth", contacts, smooth), PRIOR)
-    assert found.details["estimator"] == by
+    found = choose(fit_of(contacts, fit), smooth_of(contacts, smooth), PRIOR)
+    assert found.estimator == by
     if by == "smooth":
         assert (
             "left out are 30.0 mm off the household shape and 2.0 mm off the smooth surface"
@@ -68,29 +70,29 @@ def test_what_predicts_left_out_contacts_better_answers_from_the_first_contact_o
 
 def test_the_smooth_surface_must_be_likelier_by_the_stated_odds() -> None:
     """One contact off by the scale alone costs log 2."""
-    smooth = candidate("smooth", 1, PREDICTION_SCALE)
+    smooth = smooth_of(1, PREDICTION_SCALE)
     for by, name in ((0.99, "family"), (1.01, "smooth")):
         error = PREDICTION_SCALE * np.sqrt(np.exp(np.log(2.0) + by * FAMILY_ODDS) - 1.0)
-        assert choose(candidate("family", 1, error), smooth, None).details["estimator"] == name
+        assert choose(fit_of(1, error), smooth, None).estimator == name
 
 
 @pytest.mark.parametrize(
-    ("changes", "details", "reason"),
+    ("changes", "reason"),
     [
-        ({"outline_error": 1.1 * MAX_OUTLINE_ERROR}, {}, "misses or adds 6 % of the outline"),
-        ({"outline_error": 0.9 * MAX_OUTLINE_ERROR}, {}, None),
-        ({}, {"strained": True}, "on a bench as this is calibrated"),
-        ({}, {"sighted": False, "beyond_m": 1.1 * MAX_BEYOND}, "11 mm beyond 12 contacts"),
-        ({}, {"sighted": False, "beyond_m": 0.9 * MAX_BEYOND}, None),
-        ({}, {"sighted": True, "beyond_m": 1.1 * MAX_BEYOND}, None),  # the picture shows that it is there
+        ({"outline_error": 1.1 * MAX_OUTLINE_ERROR}, "misses or adds 6 % of the outline"),
+        ({"outline_error": 0.9 * MAX_OUTLINE_ERROR}, None),
+        ({"nuisance": EXCESSIVE}, "on a bench as this is calibrated"),
+        ({"sighted": False, "beyond_contacts": 1.1 * MAX_BEYOND}, "11 mm beyond 12 contacts"),
+        ({"sighted": False, "beyond_contacts": 0.9 * MAX_BEYOND}, None),
+        ({"sighted": True, "beyond_contacts": 1.1 * MAX_BEYOND}, None),  # the picture shows that it is there
     ],
 )
 def test_a_family_that_contradicts_the_readings_is_rejected_with_the_reason(
-    changes: dict[str, float], details: dict[str, object], reason: str | None
+    changes: dict[str, Any], reason: str | None
 ) -> None:
-    fit = replace(candidate("family", BLIND_CONTACTS, **details), **changes)  # type: ignore[arg-type]
-    found = choose(fit, candidate("smooth", BLIND_CONTACTS, 20e-3), PRIOR)
-    assert found.details["estimator"] == ("family" if reason is None else "smooth")
+    fit = fit_of(BLIND_CONTACTS, **changes)
+    found = choose(fit, smooth_of(BLIND_CONTACTS, 20e-3), PRIOR)
+    assert found.estimator == ("family" if reason is None else "smooth")
     if reason is not None:
         assert reason in found.flags[-1]
         assert "the smooth surface through all contacts" in found.flags[-1]
@@ -100,13 +102,13 @@ def test_a_family_that_contradicts_the_readings_is_rejected_with_the_reason(
 
 def test_a_shape_beyond_few_contacts_without_a_picture_may_be_there() -> None:
     few = BLIND_CONTACTS - 1
-    fit = candidate("family", few, sighted=False, beyond_m=1.1 * MAX_BEYOND)
-    assert choose(fit, candidate("smooth", few, 20e-3), None).details["estimator"] == "family"
+    fit = fit_of(few, sighted=False, beyond_contacts=1.1 * MAX_BEYOND)
+    assert choose(fit, smooth_of(few, 20e-3), None).estimator == "family"
 
 
 @pytest.mark.parametrize("contacts", [0, 1, MIN_CONTACTS - 1, MIN_CONTACTS])
 def test_an_assumed_family_states_the_deviation_of_the_assumption_and_bounds_nothing(contacts: int) -> None:
-    found = choose(candidate("family", contacts), candidate("smooth", contacts) if contacts else None, None)
+    found = choose(fit_of(contacts), smooth_of(contacts) if contacts else None, None)
     assumed = contacts < MIN_CONTACTS
     at_least = np.hypot(DEVIATION, ASSUMED_DEVIATION) if assumed else DEVIATION
     np.testing.assert_allclose(found.deviation, [at_least, DEVIATION])
@@ -115,19 +117,19 @@ def test_an_assumed_family_states_the_deviation_of_the_assumption_and_bounds_not
 
 
 def test_a_tested_family_is_no_surer_than_its_predictions_where_nothing_was_touched() -> None:
-    fit, smooth = candidate("family", MIN_CONTACTS, 3e-3), candidate("smooth", MIN_CONTACTS, 9e-3)
+    fit, smooth = fit_of(MIN_CONTACTS, 3e-3), smooth_of(MIN_CONTACTS, 9e-3)
     np.testing.assert_allclose(choose(fit, smooth, None).deviation, [3e-3, DEVIATION])
 
 
 def test_a_rejected_family_without_a_smooth_surface_answers_as_an_assumption() -> None:
-    found = choose(candidate("family", MIN_CONTACTS, strained=True), None, None)
+    found = choose(fit_of(MIN_CONTACTS, nuisance=EXCESSIVE), None, None)
     assert found.deviation[0] > ASSUMED_DEVIATION
     assert found.not_bounded == ("x",)
     assert "calibrated" in found.flags[-1]
 
 
 def test_where_no_household_shape_is_at_the_stated_place_the_smooth_surface_answers() -> None:
-    found = choose(None, candidate("smooth", 2), None)
+    found = choose(None, smooth_of(2), None)
     assert "no household shape at the stated place" in found.flags[-1]
 
 

@@ -26,6 +26,7 @@ def estimate() -> ShapeEstimate:
         doubtful={},
         flags=(),
         seconds=0.0,
+        estimator="test",
     )
 
 

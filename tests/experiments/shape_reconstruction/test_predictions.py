@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from experiments.shape_reconstruction.family.estimate import family_estimate
+from experiments.shape_reconstruction.family.estimate import fit_family
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.prior.surface import by_glanced_surface
 from experiments.shape_reconstruction.reconstruct import outline_error, predict_left_out
@@ -54,7 +54,7 @@ def test_the_outline_may_be_off_by_the_camera_s_error() -> None:
 
 
 def test_a_right_family_predicts_contacts_and_a_slipped_one_is_off_by_its_slip() -> None:
-    found = family_estimate(READINGS, LEVELS["coarse"])
+    found = fit_family(READINGS, LEVELS["coarse"])
     assert np.median(predict_left_out(found, READINGS)) < 1.5e-3
     up = np.array([0.0, 0.0, 1.0])
     bad = replace(TOUCHES[3], points=TOUCHES[3].points + 12e-3 * TOUCHES[3].mean_normal + 0.0 * up)
@@ -64,7 +64,7 @@ def test_a_right_family_predicts_contacts_and_a_slipped_one_is_off_by_its_slip()
 
 def test_the_prior_is_bent_to_its_contacts_and_stays_in_the_free_space() -> None:
     found = bend_prior(READINGS)
-    mesh = found.estimate.mesh
+    mesh = found.mesh
     points = np.concatenate([touch.points for touch in TOUCHES])
     before = NearestSurface(by_glanced_surface(READINGS).mesh).distances(points)
     after = NearestSurface(mesh).distances(points)
@@ -80,13 +80,13 @@ def test_the_prior_is_bent_to_its_contacts_and_stays_in_the_free_space() -> None
 
 def test_a_bent_prior_is_surest_where_it_was_touched_and_as_unsure_as_its_predictions() -> None:
     found = bend_prior(READINGS)
-    known, deviation = found.estimate.known_by, found.estimate.deviation
+    known, deviation = found.known_by, found.deviation
     assert deviation[known == TOUCHED].mean() < 0.5 * deviation[known != TOUCHED].mean()
     assert deviation.max() >= 0.95 * found.prediction_error
     alone = bend_prior(replace(READINGS, touches=TOUCHES[:1]))
     assert alone.left_out.shape == (1,)
     prior = by_glanced_surface(READINGS)
-    assert alone.estimate.deviation.max() >= 0.95 * prior.deviation.max()
+    assert alone.deviation.max() >= 0.95 * prior.deviation.max()
     # Without the one contact there is the prior alone.
     apart = NearestSurface(prior.mesh).distances(TOUCHES[0].points)
     assert alone.left_out[0] == pytest.approx(np.sqrt(np.mean(apart**2)), abs=2.5e-3)

@@ -1,16 +1,20 @@
 """Number of searches of the family, the fit that is kept, and its competitors."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from experiments.shape_reconstruction import reconstruct as reconstruction
-from experiments.shape_reconstruction.choice import MAX_OUTLINE_ERROR, MIN_CONTACTS, Candidate
+from experiments.shape_reconstruction.choice import MAX_OUTLINE_ERROR, MIN_CONTACTS
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.estimate import LEFT, LOOSE, RIVAL
-from experiments.shape_reconstruction.family.freedom import STRAINED
+from experiments.shape_reconstruction.family.classes import draw_shape
+from experiments.shape_reconstruction.family.estimate import LOOSE, RIVAL
+from experiments.shape_reconstruction.family.freedom import MAX_NUISANCE_COST, NuisanceCost
+from experiments.shape_reconstruction.family.search import Hypothesis
 from experiments.shape_reconstruction.family.settings import CONTINUED, FamilySettings
+from experiments.shape_reconstruction.fits import FamilyFit, SmoothFit
 from experiments.shape_reconstruction.prior.network import shipped, with_supposed
 from experiments.shape_reconstruction.reconstruct import (
     SEARCHES,
@@ -22,53 +26,58 @@ from experiments.shape_reconstruction.smooth.hermite import by_hermite
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, OutOfDomain
 from harness.objects.builtin import build
+from tests.support.family_shapes import family_fit, mixture_of
 from tests.support.shape_readings import look_at, shape_readings, touches_on
 
 MUG = build("mug")
 READINGS = shape_readings(touches_on(MUG, 12, seed=0), look_at(MUG))
 SMOOTH = by_hermite(READINGS, symmetric=False)
-HYPOTHESES: list[object] = []
 
 
 def part(contacts: int, sighted: bool = True) -> ShapeEvidence:
     return replace(READINGS, touches=READINGS.touches[:contacts], look=READINGS.look if sighted else None)
 
 
-def details_of(poor: bool = False, strain: float = 0.0, rival: float = 0.0) -> dict[str, object]:
-    """Details of the family's estimate besides its surface."""
-    return {
-        "cost": 1.0, "contact_cost": (2.0 if poor else 0.1) * LOOSE, "strain": strain,
-        "strained": strain > STRAINED, "sighted": True, "beyond_m": 0.0, "hypotheses": HYPOTHESES,
-        "classes": {"mug": 1.0 - rival, "jug": rival}, "estimator": "family",
-    }  # fmt: skip
+SHAPES = tuple(draw_shape(name, np.random.default_rng(0)) for name in ("mug", "can"))
+
+
+def fit_of(residual: float = 0.1, nuisance: float = 0.0, rival: float = 0.0, cost: float = 1.0) -> FamilyFit:
+    """A fit whose contacts are off by so many times ``LOOSE``."""
+    return family_fit(
+        mixture_of(*SHAPES, weights=(1.0 - rival, rival), cost=cost),
+        contact_cost=residual * LOOSE,
+        nuisance=NuisanceCost(nuisance, ""),
+    )
 
 
 class Family:
     """Stands for the family's search; every search has a number, which is its estimate's flag."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, *found: dict[str, object]) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *found: FamilyFit) -> None:
         self.found, self.seeds, self.given = found, list[int](), list[ShapeEvidence]()
-        self.begun: list[tuple[ShapeEstimate, ...]] = []
+        self.begun: list[Sequence[Hypothesis]] = []
         self.outline = 0.0
-        monkeypatch.setattr(reconstruction, "family_estimate", self)
+        monkeypatch.setattr(reconstruction, "fit_family", self)
         monkeypatch.setattr(reconstruction, "outline_error", lambda *_: self.outline)
         monkeypatch.setattr(reconstruction, "predict_left_out", lambda *_: np.zeros(0))
         monkeypatch.setattr(
-            reconstruction, "_smooth", lambda evidence: Candidate(SMOOTH, np.zeros(len(evidence.contacts)))
+            reconstruction,
+            "_smooth",
+            lambda evidence: replace(SMOOTH, left_out=np.zeros(len(evidence.contacts))),
         )
 
     def __call__(
-        self, evidence: ShapeEvidence, settings: FamilySettings, previous: tuple[ShapeEstimate, ...] = ()
-    ) -> ShapeEstimate:
+        self, evidence: ShapeEvidence, settings: FamilySettings, seeds: Sequence[Hypothesis] = ()
+    ) -> FamilyFit:
         number = len(self.seeds)
         self.given.append(evidence)
-        self.begun.append(previous)
+        self.begun.append(seeds)
         self.seeds.append(settings.seed)
-        details = self.found[min(number, len(self.found) - 1)]
-        return replace(SMOOTH, details=details, flags=(f"search {number}",), seconds=1.0)
+        found = self.found[min(number, len(self.found) - 1)]
+        return replace(found, left_out=np.zeros(len(evidence.contacts)), flags=(f"search {number}",))
 
 
-GOOD, POOR = details_of(), details_of(poor=True)
+GOOD, POOR = fit_of(), fit_of(residual=2.0)
 
 
 @pytest.mark.parametrize(
@@ -79,20 +88,20 @@ GOOD, POOR = details_of(), details_of(poor=True)
         (5, False, [GOOD], 1, 0),
         (8, True, [POOR], SEARCHES, 0),  # of equals the first
         (8, True, [POOR, GOOD], 2, 1),
-        (8, True, [POOR, {**POOR, "contact_cost": 1.5 * LOOSE, "cost": 9.0}, POOR], SEARCHES, 1),
+        (8, True, [POOR, fit_of(residual=1.5, cost=9.0), POOR], SEARCHES, 1),
         (1, True, [POOR, GOOD], 2, 1),
-        (8, True, [details_of(strain=1.1 * STRAINED), GOOD], 2, 1),
-        (8, True, [details_of(rival=1.1 * RIVAL), {**GOOD, "cost": 0.5}], 2, 1),
-        (5, True, [details_of(rival=1.1 * RIVAL)], 1, 0),
-        (5, True, [details_of(strain=1.1 * UNEASY), {**GOOD, "cost": 0.5}], 2, 1),
-        (8, True, [details_of(strain=1.1 * UNEASY)], 1, 0),
+        (8, True, [fit_of(nuisance=1.1 * MAX_NUISANCE_COST), GOOD], 2, 1),
+        (8, True, [fit_of(rival=1.1 * RIVAL), fit_of(cost=0.5)], 2, 1),
+        (5, True, [fit_of(rival=1.1 * RIVAL)], 1, 0),
+        (5, True, [fit_of(nuisance=1.1 * UNEASY), fit_of(cost=0.5)], 2, 1),
+        (8, True, [fit_of(nuisance=1.1 * UNEASY)], 1, 0),
     ],
 )
 def test_a_poor_or_undecided_fit_is_searched_again_and_the_best_is_kept(
     monkeypatch: pytest.MonkeyPatch,
     contacts: int,
     sighted: bool,
-    found: list[dict[str, object]],
+    found: list[FamilyFit],
     made: int,
     kept: int,
 ) -> None:
@@ -109,21 +118,22 @@ def test_a_fit_beside_the_outline_is_searched_again(monkeypatch: pytest.MonkeyPa
     answer = reconstruct(part(8))
     assert len(family.seeds) == SEARCHES
     assert "of the outline" in answer.flags[-1]
-    assert answer.details[LEFT] is HYPOTHESES  # where the next press begins
+    assert isinstance(answer, SmoothFit)
+    assert answer.rejected is not None  # the next press begins at its hypotheses
+    assert answer.details()["hypotheses_left"] == answer.rejected.mixture.as_json()
 
 
 @pytest.mark.parametrize(
-    ("first", "again"), [(POOR, True), (details_of(strain=1.1 * STRAINED), True), (GOOD, False)]
+    ("first", "again"), [(POOR, True), (fit_of(nuisance=1.1 * MAX_NUISANCE_COST), True), (GOOD, False)]
 )
 def test_between_presses_a_poor_fit_is_searched_again_beside_its_hypotheses(
-    monkeypatch: pytest.MonkeyPatch, first: dict[str, object], again: bool
+    monkeypatch: pytest.MonkeyPatch, first: FamilyFit, again: bool
 ) -> None:
     family = Family(monkeypatch, first, GOOD)
-    answer = reconstruct(part(8), CONTINUED, SMOOTH)
+    before = replace(SMOOTH, rejected=fit_of(cost=7.0))
+    answer = reconstruct(part(8), CONTINUED, before)
     assert answer.flags[0] == f"search {int(again)}"
-    assert [[one.flags for one in begun] for begun in family.begun] == [[SMOOTH.flags], [("search 0",)]][
-        : 1 + again
-    ]
+    assert [begun[0].cost for begun in family.begun] == [7.0, first.mixture.best.cost][: 1 + again]
 
 
 @pytest.mark.parametrize(
@@ -149,7 +159,7 @@ def test_without_a_contact_the_prior_answers_and_during_a_run_the_family(
 ) -> None:
     family = Family(monkeypatch, GOOD)
     monkeypatch.setattr(reconstruction, "_smooth", lambda _: None)
-    assert reconstruct_with_prior(part(0)).details["estimator"] == "glance"
+    assert reconstruct_with_prior(part(0)).estimator == "glance"
     assert not family.seeds
     assert reconstruct(part(0)).flags[0] == "search 0"  # the next press needs its hypotheses
 
@@ -162,7 +172,7 @@ def test_without_a_household_shape_at_the_stated_place_the_smooth_surface_answer
     def refuse(*_: object) -> ShapeEstimate:
         raise FitRefused("too long")
 
-    monkeypatch.setattr(reconstruction, "family_estimate", refuse)
+    monkeypatch.setattr(reconstruction, "fit_family", refuse)
     assert "no household shape at the stated place" in reconstruct(part(2)).flags[-1]
     monkeypatch.setattr(reconstruction, "_smooth", lambda _: None)
     with pytest.raises(FitRefused, match="too long"):
@@ -176,14 +186,14 @@ def test_without_a_household_shape_at_the_stated_place_the_smooth_surface_answer
 def test_of_two_smooth_surfaces_that_show_the_outline_the_better_prediction_is_kept(
     monkeypatch: pytest.MonkeyPatch, outlines: tuple[float, float], misfits: tuple[float, float], kept: int
 ) -> None:
-    made = [replace(SMOOTH, flags=(str(k),), details={"left_out_m": [misfits[k]]}) for k in (0, 1)]
-    monkeypatch.setattr(reconstruction, "bend_prior", lambda _: Candidate(made[0], np.array(misfits[:1])))
+    made = [replace(SMOOTH, flags=(str(k),), left_out=np.array([misfits[k]])) for k in (0, 1)]
+    monkeypatch.setattr(reconstruction, "bend_prior", lambda _: made[0])
     monkeypatch.setattr(reconstruction, "by_hermite", lambda *_, **__: made[1])
     shown = iter(outlines)
     monkeypatch.setattr(reconstruction, "outline_error", lambda *_: next(shown))
     found = reconstruction._smooth(part(MIN_CONTACTS))
     assert found is not None
-    assert found.estimate.flags == (str(kept),)
+    assert found.flags == (str(kept),)
 
 
 def test_where_no_smooth_surface_is_left_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,7 +25,7 @@ NOTHING = np.zeros((0, 3))
 
 def estimated(mesh: Mesh) -> ShapeEstimate:
     known = np.full(len(mesh.vertices), SUPPOSED)
-    return ShapeEstimate(mesh, np.full(len(mesh.vertices), 1e-3), known, (), {}, (), 0.0)
+    return ShapeEstimate(mesh, np.full(len(mesh.vertices), 1e-3), known, (), {}, (), 0.0, "test")
 
 
 def touched(*places: FloatArray, met: bool = True) -> ShapeEvidence:

@@ -21,7 +21,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import frame_facing, transform
 from harness.objects.builtin import build
-from tests.support.family_shapes import surface_of
+from tests.support.family_shapes import family_fit, mixture_of, surface_of
 from tests.support.shape_readings import shape_readings, touches_on
 
 
@@ -32,17 +32,6 @@ def shape_at(height: float, aside: float = 0.0) -> FamilyShape:
     theta[[layout.X, layout.Y, layout.YAW, layout.TILT_X, layout.TILT_Y]] = 0.0
     theta[layout.LIFT], theta[layout.X] = height, aside
     return FamilyShape("can", can.code, theta)
-
-
-def estimate_of(*shapes: FamilyShape, weights: tuple[float, ...] = ()) -> ShapeEstimate:
-    mesh = build("mug")
-    stated = [
-        {"class": one.name, "weight": weight, "code": one.code.tolist(), "numbers": one.theta.tolist()}
-        for one, weight in zip(shapes, weights or [1.0 / max(len(shapes), 1)] * len(shapes), strict=True)
-    ]
-    nothing = np.zeros(len(mesh.vertices))
-    known = np.zeros(len(mesh.vertices), np.int64)
-    return ShapeEstimate(mesh, nothing, known, (), {}, (), 0.0, {"hypotheses": stated})
 
 
 def evidence() -> ShapeEvidence:
@@ -60,7 +49,7 @@ LINES = np.array([TOP, SIDE, BESIDE])
 
 
 def spared(*shapes: FamilyShape, weights: tuple[float, ...] = ()) -> FloatArray:
-    found = error_spared(evidence(), estimate_of(*shapes, weights=weights), LINES)
+    found = error_spared(evidence(), family_fit(mixture_of(*shapes, weights=weights)), LINES)
     assert found is not None
     return found
 
@@ -80,7 +69,7 @@ def test_no_press_makes_it_worse_and_none_spares_more_than_there_is() -> None:
         shapes = [draw_shape(name, random) for name in ("mug", "bowl", "spanner", "tray", "jug")]
         weights = random.dirichlet(np.ones(len(shapes)))
         lines = np.array([line(random.uniform(-0.05, 0.05, 3), random.normal(size=3)) for _ in range(10)])
-        found = error_spared(evidence(), estimate_of(*shapes, weights=tuple(weights)), lines)
+        found = error_spared(evidence(), family_fit(mixture_of(*shapes, weights=tuple(weights))), lines)
         assert found is not None
         now = float((distances_apart(shapes) @ weights).min())
         assert np.all(found >= 0.0)
@@ -119,7 +108,7 @@ def test_the_gel_is_as_wide_as_it_is() -> None:
     can = shape_at(0.0)
     radius = float(np.abs(surface_of(can).vertices[:, 0]).max())
     beside = np.array([line((radius + 4e-3, 0.0, 0.01), (0.0, 0.0, -1.0))])
-    two = estimate_of(can, shape_at(16e-3))
+    two = family_fit(mixture_of(can, shape_at(16e-3)))
     found = error_spared(evidence(), two, beside)
     assert found is not None
     assert found[0] > 1e-3
@@ -165,10 +154,13 @@ def test_a_line_that_ends_before_the_shape_meets_nothing() -> None:
 
 
 def test_shapes_that_agree_leave_the_press_to_go_where_none_was() -> None:
-    alike = estimate_of(shape_at(0.0), shape_at(1.0e-3))
+    alike = family_fit(mixture_of(shape_at(0.0), shape_at(1.0e-3)))
     assert error_spared(evidence(), alike, LINES) is None
     assert np.array_equal(most_informative(evidence(), alike, LINES), farthest(evidence(), alike, LINES))
 
 
 def test_an_estimate_without_hypotheses_says_nothing_of_where_it_is_unsure() -> None:
-    assert error_spared(evidence(), estimate_of(), LINES) is None
+    fit = family_fit(mixture_of(shape_at(0.0), shape_at(16e-3)))
+    plain = ShapeEstimate(fit.mesh, fit.deviation, fit.known_by, (), {}, (), 0.0, "test")
+    assert error_spared(evidence(), fit, LINES) is not None
+    assert error_spared(evidence(), plain, LINES) is None

@@ -72,8 +72,8 @@ def test_each_estimate_is_given_that_of_a_press_less(monkeypatch: pytest.MonkeyP
     def continued(
         evidence: ShapeEvidence, _settings: FamilySettings, previous: ShapeEstimate | None
     ) -> ShapeEstimate:
-        given.append(previous and previous.details["presses"])
-        return replace(by_hermite(evidence_of(TOUCHES)), details={"presses": len(evidence.touches)})
+        given.append(previous and previous.counts["presses"])
+        return replace(by_hermite(evidence_of(TOUCHES)), counts={"presses": len(evidence.touches)})
 
     monkeypatch.setattr(running, "continued", continued)
     RunningShape(INFORMATIVE).after(evidence_of(TOUCHES[:3]))

@@ -47,10 +47,10 @@ def test_without_a_contact_the_answer_is_by_a_glance_and_with_one_it_is_not() ->
     mesh = build("mug", 6e-3)
     seen = evidence_of((), look_at(mesh))
     found = estimated("family", seen)
-    assert found.details["estimator"] == "glance"
+    assert found.estimator == "glance"
     assert any("picture alone" in flag for flag in found.flags)
     touched = estimated("family", evidence_of(presses(mesh, 1, seed=3), look_at(mesh)))
-    assert touched.details["kind"] == "family"
+    assert touched.estimator == "family"
 
 
 def test_what_is_too_large_for_the_network_is_not_glanced_at() -> None:
@@ -59,7 +59,7 @@ def test_what_is_too_large_for_the_network_is_not_glanced_at() -> None:
     seen = evidence_of((), look_at(large), largest=0.8)
     with pytest.raises(FitRefused, match="200 mm"):
         by_glanced_surface(seen)
-    assert estimated("family", seen).details.get("estimator") != "glance"
+    assert estimated("family", seen).estimator != "glance"
 
 
 def test_closing_fills_a_ball_and_leaves_a_bowl_open() -> None:

@@ -82,7 +82,7 @@ def test_the_smooth_surface_of_a_vessel_is_open_where_a_touch_went_down_into_it(
     nothing = replace(down, points=np.zeros((0, 3)), normals=np.zeros((0, 3)))
     ends = {"met": [down], "missed": [nothing], "not made": []}[last]
     found = by_hermite(replace(evidence, touches=(*others, *ends)))
-    assert found.details["axis_m"] == pytest.approx(CENTRE[:2], abs=1e-3)
+    assert found.details()["axis_m"] == pytest.approx(CENTRE[:2], abs=1e-3)
     inside = is_inside(circle(0.03, 0.06)[:-1], found.mesh.corners)
     assert not inside.any() if hollow else inside.all()
     wall = is_inside(circle(RADIUS - 3e-3, 0.07)[:-1], found.mesh.corners)
