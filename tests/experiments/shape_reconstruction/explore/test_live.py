@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.shape_reconstruction import running
 from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.explore import running
 from experiments.shape_reconstruction.explore.running import (
     INFORMATIVE,
     MOST,
