@@ -6,9 +6,9 @@ import numpy as np
 
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.freedom import basis_of
+from experiments.shape_reconstruction.family.kind import FamilyShape
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, transform
 from tests.support.family_shapes import drawn, surface_of
@@ -26,7 +26,7 @@ def nudged(shape: FamilyShape, by: float, seed: int = 0) -> FloatArray:
     """The vector of a shape, every free number moved at random, those of the bench by less."""
     basis = basis_of(shape.code, True, True)
     step = by * np.random.default_rng(seed).standard_normal(len(basis))
-    own = basis[:, layout.POSE_END :].any(axis=1)
+    own = basis[:, layout.POSE_SIZE :].any(axis=1)
     return np.asarray(shape.theta + np.where(own, step, 0.05 * step) @ basis)
 
 

@@ -4,9 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.shape_reconstruction.family.classes import FamilyShape, draw_shape
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
 from experiments.shape_reconstruction.family.freedom import NuisanceCost
+from experiments.shape_reconstruction.family.kind import FamilyShape
+from experiments.shape_reconstruction.family.kinds import draw_shape
 from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.family.search import Hypothesis, PriorRows
 from experiments.shape_reconstruction.fits import FamilyFit

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
-from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
+from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.rays import first_met
 from experiments.shape_reconstruction.fits import FamilyFit
 from experiments.shape_reconstruction.section import Choice

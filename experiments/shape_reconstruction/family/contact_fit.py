@@ -13,9 +13,9 @@ from scipy.spatial.distance import cdist
 
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.contact_rows import SLIPPED, contact_sums
 from experiments.shape_reconstruction.family.distance import distances
+from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, farthest_points
 from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
 from harness.basics.arrays import BoolArray, FloatArray

@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.contact_fit import (
     ContactFit,
     contact_fit,
@@ -21,6 +20,7 @@ from experiments.shape_reconstruction.family.contact_fit import (
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import corners_of, median_surface
 from experiments.shape_reconstruction.family.freedom import NuisanceCost
+from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
 from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
 from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from experiments.shape_reconstruction.family.classes import FamilyShape
-from experiments.shape_reconstruction.family.distance import BOX, PREPARED, distance, prepare
-from experiments.shape_reconstruction.family.layout import FLOOR, HOLLOW, KIND, TURNED, WALL
+from experiments.shape_reconstruction.family.distance import distance, prepare
+from experiments.shape_reconstruction.family.kind import FamilyShape
+from experiments.shape_reconstruction.family.kinds import kind_of
+from experiments.shape_reconstruction.family.layout import BOX, PREPARED
 from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.smooth.grid import BodySurface, extract_body
 from harness.basics.arrays import FloatArray, IntArray
@@ -77,17 +78,16 @@ def median_surface(mixture: Mixture, pitch: float, contacts: FloatArray | None =
 
 def _wall(shape: FamilyShape) -> float:
     """M of a hollow body's wall and floor, the thinner; infinite of any other, which has none."""
-    if shape.code[KIND] != TURNED or not shape.code[HOLLOW]:
-        return np.inf
-    return float(np.exp(shape.theta[[WALL, FLOOR]].min()))
+    walls = list(kind_of(shape.code).walls(shape.code))
+    return float(np.exp(shape.theta[walls].min())) if walls else np.inf
 
 
 def _thickened(shape: FamilyShape, least: float) -> FamilyShape:
     """The same, its wall and floor at least so many m thick; its outside as it was."""
     if _wall(shape) >= least:
         return shape
-    theta = shape.theta.copy()
-    theta[[WALL, FLOOR]] = np.maximum(theta[[WALL, FLOOR]], np.log(least))
+    theta, walls = shape.theta.copy(), list(kind_of(shape.code).walls(shape.code))
+    theta[walls] = np.maximum(theta[walls], np.log(least))
     return FamilyShape(shape.name, shape.code, theta)
 
 

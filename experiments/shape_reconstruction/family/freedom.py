@@ -12,19 +12,7 @@ from typing import TypeVar, cast
 import numpy as np
 
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.layout import (
-    BAR,
-    BENT,
-    CORED,
-    FLAT_SIDED,
-    LOOP,
-    NO_LIMB,
-    PLAIN,
-    ROUND,
-    SUPER,
-    TOOL,
-    TURNED,
-)
+from experiments.shape_reconstruction.family.kinds import kind_of
 from harness.basics.arrays import FloatArray, IntArray
 
 TILT = float(np.radians(0.8))
@@ -36,42 +24,8 @@ GEL_OFF = (0.6e-3, 0.6e-3, 0.4e-3)
 OUTLINE_BIAS, OUTLINE_OFF = -0.15, 0.3
 """Pixels by which masks reach beyond objects: a pixel counts where the object covers about a third of it."""
 
-_DEVIATIONS = {
-    TURNED: {
-        layout.HEIGHT: 0.3, layout.WARP: 0.15, layout.WALL: 0.35, layout.FLOOR: 0.4,
-        **{layout.RADII + k: 0.35 for k in range(layout.KNOTS)},
-    },
-    TOOL: {
-        layout.LENGTH: 0.35, layout.SHAFT_A: 0.3, layout.SHAFT_B: 0.3, layout.SHAFT_THICK: 0.35,
-    },
-    BENT: {
-        layout.ARC: 0.35, layout.BEND: 0.5, layout.FLAT: 0.15,
-        **{layout.GIRTHS + k: 0.35 for k in range(layout.GIRTH_KNOTS)},
-    },
-}  # fmt: skip
-_LIMB = {
-    layout.LIMB_AT: 0.12, layout.LIMB_REACH: 0.3, layout.LIMB_SLANT: 0.15, layout.LIMB_THICK: 0.25,
-    layout.LIMB_WIDE: 0.25,
-}  # fmt: skip
-_LOOP = {layout.LIMB_HALF: 0.25, layout.LIMB_CORNER: 0.7}
-_SPOUT = {
-    layout.SPOUT_AT: 0.12, layout.SPOUT_REACH: 0.3, layout.SPOUT_RISE: 0.4, layout.SPOUT_ROOT: 0.25,
-    layout.SPOUT_TIP: 0.25,
-}  # fmt: skip
-_SMOOTH = 0.10
-"""Second difference of a section's deviation from its draw."""
-
-SIZES = {
-    TURNED: (
-        layout.HEIGHT, *range(layout.RADII, layout.RADII + layout.KNOTS), layout.WALL, layout.FLOOR,
-        layout.CORE_X, layout.CORE_Y, layout.LIMB_HALF, layout.LIMB_REACH, layout.LIMB_THICK,
-        layout.LIMB_WIDE, layout.SPOUT_REACH, layout.SPOUT_ROOT, layout.SPOUT_TIP,
-    ),
-    TOOL: tuple(
-        range(layout.LENGTH, layout.SLOT_TURN)
-    ),
-    BENT: (layout.ARC, *range(layout.GIRTHS, layout.GIRTHS + layout.GIRTH_KNOTS)),
-}  # fmt: skip
+SMOOTHNESS = 0.10
+"""Standard deviation of the second difference of a section's deviation from its sample."""
 
 
 _F = TypeVar("_F", bound=Callable[..., FloatArray])
@@ -90,118 +44,72 @@ def _kept_by_code(make: _F) -> _F:
     return cast(_F, found)
 
 
-def deviations(code: IntArray) -> dict[int, float]:
-    """One standard deviation of each of the kind's own numbers that are free, from its draw."""
-    kind = int(code[layout.KIND])
-    free = dict(_DEVIATIONS[kind])
-    if kind == TURNED:
-        if code[layout.HOLLOW] == 0:
-            del free[layout.WALL], free[layout.FLOOR]
-        if code[layout.PLAN] == CORED:
-            free |= {layout.CORE_X: 0.35, layout.CORE_Y: 0.35}
-        if code[layout.PLAN] in (SUPER, FLAT_SIDED):
-            free |= {layout.ACROSS: 0.25, layout.POWER: 0.3}
-        if code[layout.LIMB] != NO_LIMB:
-            free |= _LIMB
-        if code[layout.LIMB] == LOOP:
-            free |= _LOOP
-        if code[layout.SPOUT] != 0:
-            free |= _SPOUT
-    if kind == TOOL:
-        for end, head, hole in (
-            (layout.END_A, layout.HEAD_A, layout.HOLE_A),
-            (layout.END_B, layout.HEAD_B, layout.HOLE_B),
-        ):
-            if code[end] != PLAIN:
-                free |= {head: 0.25, layout.HEAD_THICK: 0.3}
-            if code[end] > layout.DISC:
-                free[hole] = 0.25
-        if layout.SLOT in (code[layout.END_A], code[layout.END_B]):
-            free[layout.SLOT_TURN] = 0.2
-    return free
-
-
-def has_yaw(code: IntArray) -> bool:
-    """Whether a turn about the vertical changes the shape."""
-    plain = code[layout.PLAN] == ROUND and code[layout.LIMB] == NO_LIMB and code[layout.SPOUT] == 0
-    return bool(code[layout.KIND] != TURNED or not plain)
-
-
 @_kept_by_code
 def basis_of(code: IntArray, sighted: bool, touched: bool) -> FloatArray:
-    """``(n, SIZE)`` every number that is free, by itself."""
-    slots = [layout.X, layout.Y, layout.LIFT, layout.TILT_X, layout.TILT_Y, *deviations(code)]
-    if has_yaw(code):
+    """Return ``(n, size)`` directions: every free number by itself."""
+    kind = kind_of(code)
+    slots = [layout.X, layout.Y, layout.LIFT, layout.TILT_X, layout.TILT_Y, *kind.deviations(code)]
+    if kind.has_yaw(code):
         slots.append(layout.YAW)
     if sighted:
         slots += [layout.CAMERA_RIGHT, layout.CAMERA_DOWN, layout.CAMERA_SCALE, layout.OUTLINE]
     if touched:
         slots += [layout.GEL, layout.GEL + 1, layout.GEL + 2]
-    return np.asarray(np.eye(layout.SIZE)[np.sort(slots)])
+    return np.asarray(np.eye(kind.size)[np.sort(slots)])
 
 
 @_kept_by_code
 def stand_basis(code: IntArray, two_senses: bool) -> FloatArray:
-    """``(n, SIZE)`` directions of place, turn, size and proportions, along which a draw is laid down.
+    """Return ``(n, size)`` directions of position, yaw, size and proportions, along which a sample is placed.
 
-    With ``two_senses``, sight and touch, the picture's shift too: it is what they differ by most.
+    With ``two_senses``, vision and touch, the picture's shift too: it is what they differ by most.
     """
-    kind = int(code[layout.KIND])
-    rows = [_along(layout.CAMERA_RIGHT), _along(layout.CAMERA_DOWN)] if two_senses else []
-    rows += [_along(layout.X), _along(layout.Y), _along(*SIZES[kind])]
-    rows.append(_along({TURNED: layout.HEIGHT, TOOL: layout.LENGTH, BENT: layout.ARC}[kind]))
-    if has_yaw(code):
-        rows.append(_along(layout.YAW))
-    if code[layout.PLAN] == CORED and kind == TURNED:
-        rows += [_along(layout.CORE_X), _along(layout.CORE_Y)]
-    if code[layout.LIMB] == BAR:
-        rows.append(_along(layout.LIMB_REACH))
-    return np.array(rows)
+    kind = kind_of(code)
+    rows: list[tuple[int, ...]] = [(layout.CAMERA_RIGHT,), (layout.CAMERA_DOWN,)] if two_senses else []
+    rows += [(layout.X,), (layout.Y,), kind.lengths, (kind.height,)]
+    if kind.has_yaw(code):
+        rows.append((layout.YAW,))
+    rows += [(slot,) for slot in kind.proportions(code)]
+    return np.array([_along(kind.size, *slots) for slots in rows])
 
 
-def _along(*slots: int) -> FloatArray:
-    row = np.zeros(layout.SIZE)
+def _along(size: int, *slots: int) -> FloatArray:
+    row = np.zeros(size)
     row[list(slots)] = 1.0
     return row
 
 
 def bench_rows(place: float, support: float, pixel: float, shift: float, scale: float) -> FloatArray:
-    """``(n, SIZE)`` of a prior: place, support, leaning, camera and gel, in their standard deviations."""
+    """Return ``(n, POSE_SIZE)`` rows of a prior: each bench error over its deviation."""
     sigmas = {
         layout.X: place, layout.Y: place, layout.LIFT: support, layout.TILT_X: TILT, layout.TILT_Y: TILT,
         layout.CAMERA_RIGHT: shift, layout.CAMERA_DOWN: shift, layout.CAMERA_SCALE: scale,
         layout.OUTLINE: OUTLINE_OFF * pixel,
         layout.GEL: GEL_OFF[0], layout.GEL + 1: GEL_OFF[1], layout.GEL + 2: GEL_OFF[2],
     }  # fmt: skip
-    return np.array([_along(slot) / sigma for slot, sigma in sigmas.items()])
+    return np.array([_along(layout.POSE_SIZE, slot) / sigma for slot, sigma in sigmas.items()])
 
 
 @_kept_by_code
 def shape_rows(code: IntArray) -> FloatArray:
-    """``(n, SIZE)`` of a prior: each free number by itself, and the section's second differences."""
-    rows = [_along(slot) / sigma for slot, sigma in deviations(code).items()]
-    first, count = {
-        TURNED: (layout.RADII, layout.KNOTS), TOOL: (0, 0), BENT: (layout.GIRTHS, layout.GIRTH_KNOTS)
-    }[int(code[layout.KIND])]  # fmt: skip
-    for k in range(first, first + count - 2):
-        rows.append((_along(k) - 2.0 * _along(k + 1) + _along(k + 2)) / _SMOOTH)
+    """Return ``(n, size)`` rows of a prior: each free parameter, and the section's second differences."""
+    kind = kind_of(code)
+    rows = [_along(kind.size, slot) / sigma for slot, sigma in kind.deviations(code).items()]
+    for a, b, c in zip(kind.section, kind.section[1:], kind.section[2:], strict=False):
+        rows.append((_along(kind.size, a) - 2.0 * _along(kind.size, b) + _along(kind.size, c)) / SMOOTHNESS)
     return np.array(rows)
 
 
 @_kept_by_code
 def stand_rows(code: IntArray) -> FloatArray:
-    """``(n, SIZE)`` of the prior while a draw is laid on the readings: its size and proportions.
+    """Return ``(n, size)`` rows of the prior while a sample is placed: its size and proportions.
 
-    One length stands for the size, as all scale together; a place has its own rows, any turn is as likely.
+    One length stands for the size, as all scale together; the position has rows of its own.
     """
-    kind = int(code[layout.KIND])
-    anchor = {TURNED: layout.RADII, TOOL: layout.SHAFT_A, BENT: layout.GIRTHS + 2}[kind]
-    tall = {TURNED: layout.HEIGHT, TOOL: layout.LENGTH, BENT: layout.ARC}[kind]
-    rows = [_along(anchor) / 0.4, (_along(tall) - _along(anchor)) / 0.25]
-    if code[layout.PLAN] == CORED and kind == TURNED:
-        rows += [(_along(slot) - _along(anchor)) / 0.3 for slot in (layout.CORE_X, layout.CORE_Y)]
-    if code[layout.LIMB] == BAR:
-        rows.append((_along(layout.LIMB_REACH) - _along(anchor)) / 0.3)
+    kind = kind_of(code)
+    width, height = _along(kind.size, kind.width), _along(kind.size, kind.height)
+    rows = [width / 0.4, (height - width) / 0.25]
+    rows += [(_along(kind.size, slot) - width) / 0.3 for slot in kind.proportions(code)]
     return np.array(rows)
 
 
@@ -243,11 +151,11 @@ def nuisance_cost(theta: FloatArray, rows: FloatArray, middle: FloatArray) -> Nu
     """Compute the cost of the bench errors in a shape's vector.
 
     Args:
-        theta: ``(SIZE,)`` vector of the shape.
-        rows: ``(n, SIZE)``, each one bench error over its standard deviation.
-        middle: ``(SIZE,)`` expected vector.
+        theta: vector of the shape.
+        rows: ``(n, POSE_SIZE)``, each one bench error over its standard deviation.
+        middle: ``(POSE_SIZE,)`` expected pose and bench errors.
     """
-    off = rows @ (theta - middle)
+    off = rows @ (theta[: layout.POSE_SIZE] - middle)
     most = int(np.argmax(np.abs(off)))
     slot = int(np.flatnonzero(rows[most])[0])
     name, unit, factor = _NAMES[slot]

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.freedom import basis_of
+from experiments.shape_reconstruction.family.kind import FamilyShape
+from experiments.shape_reconstruction.family.kinds import KINDS
 from experiments.shape_reconstruction.family.search import TEMPERATURE, Hypothesis
 from harness.basics.arrays import FloatArray
 
@@ -15,6 +16,9 @@ LEAST = 0.01
 
 SAMPLES = 16
 """Shapes drawn about each hypothesis: fewer tell a press apart from others by chance."""
+
+VECTOR_SIZE = max(kind.size for kind in KINDS)
+"""Numbers of each vector in the result; those that a kind has not are zero."""
 
 _LONGEST = 2.5
 """Standard deviations of a prior that a drawn number is off its hypothesis at most."""
@@ -53,12 +57,17 @@ class Mixture:
                 "weight": float(weight),
                 "cost": one.cost,
                 "code": one.shape.code.tolist(),
-                "numbers": one.shape.theta.tolist(),
-                "about": [shape.theta.tolist() for shape in about],
-                "drawn_about": one.prior.middle.tolist(),
+                "numbers": _padded(one.shape.theta),
+                "about": [_padded(shape.theta) for shape in about],
+                "drawn_about": _padded(one.prior.middle),
             }
             for one, weight, about in zip(self.hypotheses, self.weights, self.about, strict=True)
         ]
+
+
+def _padded(theta: FloatArray) -> list[float]:
+    """The numbers of a vector in the result, as many for every kind."""
+    return [*theta.tolist(), *[0.0] * (VECTOR_SIZE - len(theta))]
 
 
 def mixture_of(found: list[Hypothesis], sighted: bool, touched: bool, seed: int) -> Mixture:

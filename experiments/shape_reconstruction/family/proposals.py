@@ -10,27 +10,10 @@ import numpy as np
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import FamilyShape, add_part, size_of
-from experiments.shape_reconstruction.family.freedom import SIZES, deviations, has_yaw
-from experiments.shape_reconstruction.family.layout import (
-    CORED,
-    DISC,
-    FLAT_SIDED,
-    KNOTS,
-    LOOP,
-    NO_LIMB,
-    PLAIN,
-    RING,
-    ROUND,
-    SLOT,
-    SUPER,
-    TOOL,
-    TURNED,
-)
+from experiments.shape_reconstruction.family.kind import FamilyShape, Random
+from experiments.shape_reconstruction.family.kinds import kind_of
 from experiments.shape_reconstruction.family.observed import directions_of
 from harness.basics.arrays import FloatArray
-
-_Random = np.random.Generator
 
 OWN = 0.3
 """Share of the draws that keep the size that they were drawn with."""
@@ -75,7 +58,7 @@ class Guides:
         return np.asarray(self.eye[:2] + away[:, None] * down[:, :2])
 
 
-def lay(shape: FamilyShape, guides: Guides, random: _Random, place_error: float, yaws: int) -> FloatArray:
+def lay(shape: FamilyShape, guides: Guides, random: Random, place_error: float, yaws: int) -> FloatArray:
     """Vectors of a draw at a place and in a size of the readings, at several turns.
 
     Args:
@@ -88,15 +71,14 @@ def lay(shape: FamilyShape, guides: Guides, random: _Random, place_error: float,
     Returns:
         ``(yaws, SIZE)``.
     """
-    theta = shape.theta.copy()
-    long = bool(shape.code[layout.KIND] != TURNED)
+    theta, kind = shape.theta.copy(), kind_of(shape.code)
     turn = None
-    if guides.sighted and long:
-        found = _long_direction(guides.on_level(0.5 * size_of(shape.code, theta)[1]))
+    if guides.sighted and kind.is_elongated:
+        found = _long_direction(guides.on_level(0.5 * kind.extent(shape.code, theta)[1]))
         turn = 0.0 if found is None else found
-    theta[list(SIZES[int(shape.code[layout.KIND])])] += _log_scale(shape, guides, random, turn)
-    theta[layout.X : layout.Y + 1] = _middle(shape, theta, guides, random, place_error, long)
-    count = yaws if has_yaw(shape.code) else 1
+    theta[list(kind.lengths)] += _log_scale(shape, guides, random, turn)
+    theta[layout.X : layout.Y + 1] = _middle(shape, theta, guides, random, place_error)
+    count = yaws if kind.has_yaw(shape.code) else 1
     laid = np.repeat(theta[None], count, axis=0)
     # Turns that the readings propose and their opposites, then any, evenly spread.
     turns = random.uniform(0.0, 2.0 * np.pi) + 2.0 * np.pi * np.arange(count) / count
@@ -107,7 +89,7 @@ def lay(shape: FamilyShape, guides: Guides, random: _Random, place_error: float,
         few = (count + 1) // 3
         turns[:few] = random.choice(guides.turns, few) + 0.5 * np.pi * random.integers(0, 4, few)
     laid[:, layout.YAW] = turns
-    if shape.code[layout.PLAN] == CORED and len(guides.places) >= ENOUGH and random.random() < SPANNED:
+    if kind.has_sides(shape.code) and len(guides.places) >= ENOUGH and random.random() < SPANNED:
         # A body with straight sides has the sides and the middle of the contacts' box, as it is turned.
         for one in laid:
             cosine, sine = np.cos(one[layout.YAW]), np.sin(one[layout.YAW])
@@ -117,16 +99,15 @@ def lay(shape: FamilyShape, guides: Guides, random: _Random, place_error: float,
             middle = 0.5 * (low + high)
             one[layout.X] = cosine * middle[0] - sine * middle[1]
             one[layout.Y] = sine * middle[0] + cosine * middle[1]
-            corner = float(np.exp(one[layout.RADII : layout.RADII + KNOTS].max()))
-            one[[layout.CORE_X, layout.CORE_Y]] = np.log(np.maximum(half - corner, 0.1 * half))
+            kind.set_sides(one, half)
     return laid
 
 
-def _log_scale(shape: FamilyShape, guides: Guides, random: _Random, turn: float | None) -> float:
+def _log_scale(shape: FamilyShape, guides: Guides, random: Random, turn: float | None) -> float:
     """By which all lengths of a draw are scaled, so that it is as large as what was seen or touched."""
     if random.random() < OWN or not (guides.sighted or guides.touched):
         return 0.0
-    half, height = size_of(shape.code, shape.theta)
+    half, height = kind_of(shape.code).extent(shape.code, shape.theta)
     if not guides.sighted:
         wide, high = float(np.linalg.norm(guides.extents[:2])), float(guides.extents[2])
         least = max(wide / (2.0 * half), high / height)
@@ -146,7 +127,7 @@ def _log_scale(shape: FamilyShape, guides: Guides, random: _Random, turn: float 
 
 
 def _middle(
-    shape: FamilyShape, theta: FloatArray, guides: Guides, random: _Random, place_error: float, long: bool
+    shape: FamilyShape, theta: FloatArray, guides: Guides, random: Random, place_error: float
 ) -> FloatArray:
     by_touch = guides.touched and random.random() < (0.4 if guides.sighted else 0.9)
     if by_touch:
@@ -154,8 +135,9 @@ def _middle(
         return np.asarray(near + random.normal(0.0, 5e-3, 2))
     if not guides.sighted:
         return np.asarray(random.normal(0.0, place_error, 2))
-    height = size_of(shape.code, theta)[1]
-    if long:
+    kind = kind_of(shape.code)
+    height = kind.extent(shape.code, theta)[1]
+    if kind.is_elongated:
         level = guides.on_level(0.5 * height)
         if len(level):
             return np.asarray(0.5 * (level.min(axis=0) + level.max(axis=0)))
@@ -241,98 +223,26 @@ def _by_sight(evidence: ShapeEvidence) -> tuple[FloatArray, FloatArray, FloatArr
     return (high - low) / look.focal_length, look.stand_from_camera[:3, 3].copy(), ray, outline
 
 
-LOOPS, TURNS = 3, 8
-"""Handles drawn where there is none, and turns that each is tried at."""
-
-HEADS, _HOLE = (1.4, 2.0, 2.8), 0.55
-"""Half widths of a tool's head over that of its shaft there; of its hole over its own."""
-
 ASIDE, ASIDE_PLACE, ASIDE_TURN = 0.15, 2.0e-3, 0.1
 """Deviation of a shape beside another: of its own numbers, in deviations of their prior; of its place, in m
 along x and y; of its turn, in rad."""
 
-_ENDS = (
-    (layout.END_A, layout.SHAFT_A, layout.HEAD_A, layout.HOLE_A),
-    (layout.END_B, layout.SHAFT_B, layout.HEAD_B, layout.HOLE_B),
-)
+
+def changes(shape: FamilyShape, random: Random) -> Iterator[FamilyShape]:
+    """Yield shapes that differ from one by one part or by a rotation."""
+    kind = kind_of(shape.code)
+    if kind.has_yaw(shape.code):
+        yield shape.rotate(np.pi)
+    yield from kind.changes(shape, random)
 
 
-def changes(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
-    """Shapes that differ from one by one part or by a turn."""
-    if has_yaw(shape.code):
-        yield _turned(shape, np.pi)
-    if shape.code[layout.KIND] == TURNED:
-        yield from _of_vessel(shape, random)
-    elif shape.code[layout.KIND] == TOOL:
-        yield from _of_tool(shape)
-
-
-def beside(shape: FamilyShape, random: _Random) -> FamilyShape:
+def beside(shape: FamilyShape, random: Random) -> FamilyShape:
     """The same parts with all numbers a little off: fitted anew, it may find a better valley nearby."""
     theta = shape.theta.copy()
-    for slot, sigma in deviations(shape.code).items():
+    kind = kind_of(shape.code)
+    for slot, sigma in kind.deviations(shape.code).items():
         theta[slot] += ASIDE * sigma * random.standard_normal()
     theta[layout.X : layout.Y + 1] += ASIDE_PLACE * random.standard_normal(2)
-    if has_yaw(shape.code):
+    if kind.has_yaw(shape.code):
         theta[layout.YAW] += ASIDE_TURN * random.standard_normal()
     return FamilyShape(shape.name, shape.code, theta)
-
-
-def _of_vessel(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
-    code = shape.code
-    yield _coded(shape, layout.HOLLOW, 1 - int(code[layout.HOLLOW]))
-    if code[layout.LIMB] != NO_LIMB:
-        yield _coded(shape, layout.LIMB, NO_LIMB)
-        yield _turned(shape, 0.5 * np.pi)
-        yield _turned(shape, -0.5 * np.pi)
-    if code[layout.LIMB] != LOOP:
-        for _ in range(LOOPS):
-            looped, first = add_part(shape, layout.LIMB, random), random.uniform(0.0, 2.0 * np.pi)
-            for turn in range(TURNS):
-                yield _turned(looped, first + 2.0 * np.pi * turn / TURNS)
-    if code[layout.SPOUT] != 0:
-        yield _coded(shape, layout.SPOUT, 0)
-    elif code[layout.LIMB] == LOOP:
-        yield add_part(shape, layout.SPOUT, random)
-    if code[layout.PLAN] == ROUND:
-        yield _oval(shape, SUPER, 0.9)
-        if code[layout.HOLLOW] == 0:
-            yield _oval(shape, FLAT_SIDED, 0.7)
-    elif code[layout.PLAN] in (SUPER, FLAT_SIDED):
-        yield _coded(shape, layout.PLAN, ROUND)
-        if code[layout.HOLLOW] == 0:
-            yield _coded(shape, layout.PLAN, SUPER if code[layout.PLAN] == FLAT_SIDED else FLAT_SIDED)
-    elif code[layout.PLAN] == CORED:
-        yield _turned(shape, 0.5 * np.pi)
-
-
-def _of_tool(shape: FamilyShape) -> Iterator[FamilyShape]:
-    for end, shaft, head, hole in _ENDS:
-        for kind in (PLAIN, DISC, RING, SLOT):
-            if shape.code[end] == kind:
-                continue
-            changed = _coded(shape, end, kind)
-            yield changed
-            for ratio in HEADS if kind != PLAIN else ():
-                theta = changed.theta.copy()
-                theta[head] = theta[shaft] + np.log(ratio)
-                theta[hole] = theta[head] + np.log(_HOLE)
-                yield FamilyShape(changed.name, changed.code, theta)
-
-
-def _turned(shape: FamilyShape, by: float) -> FamilyShape:
-    theta = shape.theta.copy()
-    theta[layout.YAW] += by
-    return FamilyShape(shape.name, shape.code, theta)
-
-
-def _oval(shape: FamilyShape, plan: int, across: float) -> FamilyShape:
-    theta: FloatArray = shape.theta.copy()
-    theta[layout.ACROSS], theta[layout.POWER] = np.log(across), np.log(2.2)
-    return _coded(FamilyShape(shape.name, shape.code, theta), layout.PLAN, plan)
-
-
-def _coded(shape: FamilyShape, slot: int, value: int) -> FamilyShape:
-    code = shape.code.copy()
-    code[slot] = value
-    return FamilyShape(shape.name, code, shape.theta)

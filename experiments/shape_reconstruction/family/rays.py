@@ -7,8 +7,15 @@ along the ray (Danskin's theorem): by one side alone a plate would seem pinned a
 
 import numpy as np
 
-from experiments.shape_reconstruction.family.distance import BOX, PREPARED, distance, prepare
-from experiments.shape_reconstruction.family.layout import CAMERA_DOWN, CAMERA_RIGHT, CAMERA_SCALE, OUTLINE
+from experiments.shape_reconstruction.family.distance import distance, prepare
+from experiments.shape_reconstruction.family.layout import (
+    BOX,
+    CAMERA_DOWN,
+    CAMERA_RIGHT,
+    CAMERA_SCALE,
+    OUTLINE,
+    PREPARED,
+)
 from experiments.shape_reconstruction.family.observed import GRAZE, PASS, SightRays
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled, inlined

@@ -19,7 +19,7 @@ from experiments.shape_reconstruction.family.contact_rows import (
     point_row,
     weigh_contacts,
 )
-from experiments.shape_reconstruction.family.distance import PREPARED, ball, distance, inside_depth, prepare
+from experiments.shape_reconstruction.family.distance import ball, distance, inside_depth, prepare
 from experiments.shape_reconstruction.family.layout import (
     CAMERA_DOWN,
     CAMERA_RIGHT,
@@ -27,7 +27,7 @@ from experiments.shape_reconstruction.family.layout import (
     GEL,
     LIFT,
     OUTLINE,
-    SIZE,
+    PREPARED,
     X,
     Y,
 )
@@ -230,7 +230,7 @@ def slopes_along(
     hold_rays(code, theta, seen, active, out, q)
     frozen(code, theta, seen, active, out, False, q, base)
     for k in range(3):
-        towards = np.zeros(SIZE)
+        towards = np.zeros(len(theta))
         towards[_MOVES[k]] = NUDGE
         frozen(code, theta + towards, seen, active, out, False, q, here)
         moves[k] = (here - base) / NUDGE

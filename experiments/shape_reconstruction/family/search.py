@@ -8,14 +8,6 @@ import numpy as np
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import (
-    CLASSES,
-    FamilyShape,
-    codes_of,
-    draw_shape,
-    rarity,
-    rarity_of_size,
-)
 from experiments.shape_reconstruction.family.freedom import (
     OUTLINE_BIAS,
     NuisanceCost,
@@ -25,6 +17,15 @@ from experiments.shape_reconstruction.family.freedom import (
     shape_rows,
     stand_basis,
     stand_rows,
+)
+from experiments.shape_reconstruction.family.kind import FamilyShape
+from experiments.shape_reconstruction.family.kinds import (
+    CLASSES,
+    codes_of,
+    draw_shape,
+    kind_of,
+    rarity,
+    rarity_of_size,
 )
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
 from experiments.shape_reconstruction.family.proposals import Guides, beside, changes, guides_of, lay
@@ -106,7 +107,7 @@ class FamilySearch:
         self._bench = bench_rows(
             evidence.place_error, evidence.support_error, rays.pixel, rays.position_sigma, rays.scale_sigma
         )
-        self._bench_middle = np.zeros(layout.SIZE)
+        self._bench_middle = np.zeros(layout.POSE_SIZE)
         self._bench_middle[layout.OUTLINE] = OUTLINE_BIAS * rays.pixel
 
     def found(self, seeds: Iterable[Hypothesis] = ()) -> list[Hypothesis]:
@@ -188,11 +189,11 @@ class FamilySearch:
         return [self._under_prior(one.shape, one.cost) for one in draws]
 
     def _at_best_turn(self, shape: FamilyShape, random: _Random) -> Hypothesis:
-        turns = self.settings.yaws * (1 if shape.code[layout.LIMB] == layout.NO_LIMB else 2)
-        tried = lay(shape, self.guides, random, self._place_error, turns)
+        yaws = kind_of(shape.code).yaws(shape.code, self.settings.yaws)
+        tried = lay(shape, self.guides, random, self._place_error, yaws)
         tried[:, layout.OUTLINE] = self._bench_middle[layout.OUTLINE]
         middle = self._middle(tried[0])
-        prior = PriorRows(middle, np.concatenate([self._bench, stand_rows(shape.code)]))
+        prior = PriorRows(middle, self._prior_rows(stand_rows(shape.code)))
         out, q = rows_for(self.coarse), prepared_room()
         best, cost = cheapest(shape.code, tried, self.coarse, prior, out, q)
         placed = FamilyShape(shape.name, shape.code, tried[best])
@@ -218,8 +219,14 @@ class FamilySearch:
             shape: in ``stand``.
             middle: ``(SIZE,)`` that its own numbers were drawn about.
         """
-        rows = np.concatenate([self._bench, shape_rows(shape.code)])
+        rows = self._prior_rows(shape_rows(shape.code))
         return Hypothesis(shape, PriorRows(self._middle(middle), rows), np.inf, np.empty((0, 0)))
+
+    def _prior_rows(self, own: FloatArray) -> FloatArray:
+        """``(k, size)`` rows of the bench, then those of the parameters."""
+        bench = np.zeros((len(self._bench), own.shape[1]))
+        bench[:, : layout.POSE_SIZE] = self._bench
+        return np.concatenate([bench, own])
 
     def nuisance(self, shape: FamilyShape) -> NuisanceCost:
         """Compute the cost of the bench errors that a shape needs."""
@@ -231,7 +238,7 @@ class FamilySearch:
 
     def _middle(self, theta: FloatArray) -> FloatArray:
         middle = theta.copy()
-        middle[: layout.POSE_END] = self._bench_middle[: layout.POSE_END]
+        middle[: layout.POSE_SIZE] = self._bench_middle
         return middle
 
     def refined(self, one: Hypothesis, rounds: int, last: bool = False) -> Hypothesis:
@@ -282,7 +289,7 @@ def _alike(a: FamilyShape, b: FamilyShape) -> bool:
         return False
     place = np.abs(a.theta[: layout.Y + 1] - b.theta[: layout.Y + 1]).max()
     # A difference of logarithms, of a length of 50 mm.
-    own = np.abs(a.theta[layout.POSE_END :] - b.theta[layout.POSE_END :]).max() * 50e-3
+    own = np.abs(a.theta[layout.POSE_SIZE :] - b.theta[layout.POSE_SIZE :]).max() * 50e-3
     return bool(max(place, own) < ALIKE)
 
 

@@ -15,8 +15,8 @@ from experiments.shape_reconstruction.choice import (
     MIN_CONTACTS,
     choose,
 )
-from experiments.shape_reconstruction.family.classes import draw_shape
 from experiments.shape_reconstruction.family.freedom import MAX_NUISANCE_COST, NuisanceCost
+from experiments.shape_reconstruction.family.kinds import draw_shape
 from experiments.shape_reconstruction.fits import FOLDS, PREDICTION_SCALE, FamilyFit, SmoothFit, folds_of
 from tests.support.family_shapes import family_fit, mixture_of
 

@@ -9,9 +9,9 @@ import pytest
 from experiments.shape_reconstruction import reconstruct as reconstruction
 from experiments.shape_reconstruction.choice import MAX_OUTLINE_ERROR, MIN_CONTACTS
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.classes import draw_shape
 from experiments.shape_reconstruction.family.estimate import LOOSE, RIVAL
 from experiments.shape_reconstruction.family.freedom import MAX_NUISANCE_COST, NuisanceCost
+from experiments.shape_reconstruction.family.kinds import draw_shape
 from experiments.shape_reconstruction.family.search import Hypothesis
 from experiments.shape_reconstruction.family.settings import CONTINUED, FamilySettings
 from experiments.shape_reconstruction.fits import FamilyFit, SmoothFit

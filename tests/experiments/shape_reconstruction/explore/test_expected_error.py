@@ -14,7 +14,8 @@ from experiments.shape_reconstruction.explore.choosing import (
     readings_on,
 )
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import FamilyShape, draw_shape
+from experiments.shape_reconstruction.family.kind import FamilyShape
+from experiments.shape_reconstruction.family.kinds import draw_shape
 from experiments.shape_reconstruction.family.rays import first_met
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray

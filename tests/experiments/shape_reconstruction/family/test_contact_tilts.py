@@ -7,9 +7,10 @@ import pytest
 
 from experiments.shape_reconstruction.evidence import GuardedTouch
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import FamilyShape, draw_shape
 from experiments.shape_reconstruction.family.contact_fit import turned_contacts
 from experiments.shape_reconstruction.family.distance import distances
+from experiments.shape_reconstruction.family.kind import FamilyShape
+from experiments.shape_reconstruction.family.kinds import draw_shape
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, rotation_from_vector, transform
 from tests.support.shape_readings import SIGMA, shape_readings

@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import CLASSES, FamilyShape, draw_shape
+from experiments.shape_reconstruction.family import revolution_distance as revolution
 from experiments.shape_reconstruction.family.distance import (
-    PREPARED,
     distance,
     distances,
     inside_depth,
     prepare,
 )
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
+from experiments.shape_reconstruction.family.kind import FamilyShape
+from experiments.shape_reconstruction.family.kinds import CLASSES, draw_shape
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.isosurface import isosurface
 
@@ -38,7 +39,7 @@ def around(shape: FamilyShape, count: int, seed: int = 0) -> FloatArray:
 
 
 def filled(shape: FamilyShape, points: FloatArray) -> FloatArray:
-    q = np.empty(PREPARED)
+    q = np.empty(layout.PREPARED)
     prepare(shape.code, shape.theta, q)
     return np.array([distance(shape.code, q, True, *point) for point in points])
 
@@ -70,7 +71,7 @@ def test_no_place_is_nearer_to_the_surface_than_its_distance_says(name: str) -> 
 def test_everything_inside_is_in_the_body_s_box(name: str) -> None:
     for shape in drawn(name):
         points = around(shape, 600)
-        q = np.empty(PREPARED)
+        q = np.empty(layout.PREPARED)
         prepare(shape.code, shape.theta, q)
         by_box = np.array([inside_depth(shape.code, q, *point) for point in points])
         np.testing.assert_array_equal(by_box, np.minimum(distances(shape.code, shape.theta, points), 0.0))
@@ -107,7 +108,7 @@ def test_filling_holes_only_adds(name: str) -> None:
 def test_a_cavity_only_takes_away(name: str) -> None:
     for shape in drawn(name):
         solid = shape.code.copy()
-        solid[layout.HOLLOW] = 0
+        solid[revolution.HOLLOW] = 0
         points = around(shape, 300)
         hollow = distances(shape.code, shape.theta, points)
         assert (hollow >= distances(solid, shape.theta, points) - 1e-12).all()
@@ -133,11 +134,11 @@ def flat_sided(radius: float, half_depth: float) -> FamilyShape:
     """A bottle of one radius all the way up, flattened to a half depth."""
     shape = drawn("flat bottle")[0]
     code, theta = shape.code.copy(), shape.theta.copy()
-    code[layout.PLAN] = layout.FLAT_SIDED
-    theta[layout.RADII : layout.RADII + layout.KNOTS] = np.log(radius)
-    theta[layout.RADII] = np.log(WIDEST)
-    theta[layout.ACROSS] = np.log(half_depth / WIDEST)
-    theta[layout.HEIGHT] = np.log(0.2)
+    code[revolution.PLAN] = revolution.FLAT_SIDED
+    theta[revolution.SLOT.radii] = np.log(radius)
+    theta[revolution.SLOT.radii] = np.log(WIDEST)
+    theta[revolution.SLOT.across] = np.log(half_depth / WIDEST)
+    theta[revolution.SLOT.height] = np.log(0.2)
     return FamilyShape(shape.name, code, theta)
 
 
@@ -160,8 +161,8 @@ def test_a_waist_leaves_flat_sides_upright() -> None:
     """Where the outline goes in and out again the depth does not, and the distance follows the flat side."""
     shape = flat_sided(0.07, 0.02)
     theta = shape.theta.copy()
-    theta[layout.RADII : layout.RADII + layout.KNOTS] += 0.3 * np.cos(np.arange(layout.KNOTS) * np.pi)
-    theta[layout.ACROSS] = np.log(0.02) - theta[layout.RADII : layout.RADII + layout.KNOTS].max()
+    theta[revolution.SLOT.radii] += 0.3 * np.cos(np.arange(revolution.KNOTS) * np.pi)
+    theta[revolution.SLOT.across] = np.log(0.02) - theta[revolution.SLOT.radii].max()
     up = np.linspace(0.02, 0.18, 50)
     for off in (-1e-3, 0.0, 1e-3):
         beside = np.column_stack([np.zeros(50), np.full(50, 0.02 + off), up])
@@ -171,8 +172,8 @@ def test_a_waist_leaves_flat_sides_upright() -> None:
 def test_a_can_has_the_volume_of_a_cylinder() -> None:
     shape = drawn("can")[0]
     theta = shape.theta.copy()
-    theta[layout.RADII : layout.RADII + layout.KNOTS] = np.log(0.03)
-    theta[layout.HEIGHT] = np.log(0.1)
+    theta[revolution.SLOT.radii] = np.log(0.03)
+    theta[revolution.SLOT.height] = np.log(0.1)
     low, cell = np.array([-0.035, -0.035, -0.005]), 1e-3
     counts = np.array([71, 71, 111])
     surface = isosurface(grid_distances(FamilyShape("can", shape.code, theta), low, cell, counts), low, cell)

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import FamilyShape, draw_shape
+from experiments.shape_reconstruction.family import revolution_distance as revolution
 from experiments.shape_reconstruction.family.field import BELOW, corners_of, median_surface
+from experiments.shape_reconstruction.family.kind import FamilyShape
+from experiments.shape_reconstruction.family.kinds import draw_shape
 from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.family.search import Hypothesis
 from harness.basics.mesh import Mesh
@@ -14,7 +16,7 @@ from harness.basics.mesh import Mesh
 def cup_with(wall: float) -> FamilyShape:
     cup = draw_shape("bowl", np.random.default_rng(2))
     theta = cup.theta.copy()
-    theta[[layout.WALL, layout.FLOOR]] = np.log(wall)
+    theta[[revolution.SLOT.wall, revolution.SLOT.floor]] = np.log(wall)
     return FamilyShape(cup.name, cup.code, theta)
 
 
@@ -34,8 +36,8 @@ def mixture_of_all(*shapes: FamilyShape) -> Mixture:
 def board_at(x: float, thick: float) -> FamilyShape:
     board = draw_shape("board", np.random.default_rng(1))
     theta = board.theta.copy()
-    theta[layout.RADII : layout.RADII + layout.KNOTS] = np.log(0.5 * thick)
-    theta[layout.CORE_Y], theta[layout.X], theta[layout.YAW] = np.log(1e-5), x, 0.5
+    theta[revolution.SLOT.radii] = np.log(0.5 * thick)
+    theta[revolution.SLOT.core_y], theta[layout.X], theta[layout.YAW] = np.log(1e-5), x, 0.5
     return FamilyShape(board.name, board.code, theta)
 
 
@@ -89,7 +91,8 @@ def test_a_body_thinner_than_the_grid_has_a_surface(thick: float) -> None:
 def test_no_surface_goes_on_below_the_support() -> None:
     pot = draw_shape("teapot", np.random.default_rng(0))
     theta = pot.theta.copy()
-    theta[layout.SPOUT_AT], theta[layout.SPOUT_RISE], theta[layout.SPOUT_REACH] = 0.1, -2.0, np.log(0.06)
+    slot = revolution.SLOT
+    theta[[slot.spout_at, slot.spout_rise, slot.spout_reach]] = 0.1, -2.0, np.log(0.06)
     sunk = FamilyShape(pot.name, pot.code, theta)
     assert corners_of(sunk)[:, 2].min() < -0.1
     mesh = surface_of(sunk, 2.5e-3)

@@ -7,9 +7,9 @@ import pytest
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.contact_rows import contact_row_count, nearest_on_face
 from experiments.shape_reconstruction.family.distance import distances, prepare
+from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.observed import LOOSELY, MODEL, observe
 from experiments.shape_reconstruction.family.residuals import (
     active_rows,

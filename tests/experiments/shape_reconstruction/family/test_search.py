@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction.evidence import GuardedTouch
-from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import SOLID, FamilyShape, draw_shape, rarity
+from experiments.shape_reconstruction.family import layout, tool
+from experiments.shape_reconstruction.family import revolution_distance as revolution
 from experiments.shape_reconstruction.family.contact_fit import contact_fit
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, shape_rows
+from experiments.shape_reconstruction.family.kind import FamilyShape
+from experiments.shape_reconstruction.family.kinds import draw_shape, rarity
 from experiments.shape_reconstruction.family.observed import PASS, FamilyEvidence, observe
 from experiments.shape_reconstruction.family.posterior import mixture_of
 from experiments.shape_reconstruction.family.proposals import guides_of, lay
 from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
+from experiments.shape_reconstruction.family.revolution import SOLID
 from experiments.shape_reconstruction.family.search import (
     FamilySearch,
     PriorRows,
@@ -36,7 +39,7 @@ def cost_of(shape: FamilyShape, seen: FamilyEvidence, robust: bool = True) -> fl
 def prior_of(shape: FamilyShape) -> PriorRows:
     rows = np.concatenate([bench_rows(0.02, 1e-3, 2e-3, 3e-3, 5e-3), shape_rows(shape.code)])
     middle = shape.theta.copy()
-    middle[: layout.POSE_END] = 0.0
+    middle[: layout.POSE_SIZE] = 0.0
     return PriorRows(middle, rows)
 
 
@@ -72,8 +75,8 @@ def across_a_shaft(depth: float) -> tuple[FamilyShape, GuardedTouch]:
     """A tool, and a press across its shaft from above: the gel hangs over both of its sides."""
     shape = made("spanner")[0]
     theta = shape.theta.copy()
-    theta[: layout.POSE_END] = 0.0
-    theta[[layout.SHAFT_A, layout.SHAFT_B, layout.SHAFT_THICK]] = np.log(5e-3)
+    theta[: layout.POSE_SIZE] = 0.0
+    theta[[tool.SLOT.shaft_a, tool.SLOT.shaft_b, tool.SLOT.shaft_thick]] = np.log(5e-3)
     shape = FamilyShape(shape.name, shape.code, theta)
     above = np.column_stack([np.zeros((400, 2)), np.linspace(0.0, 0.1, 400)])
     top = above[np.flatnonzero(distances(shape.code, theta, above) < 0.0)[-1], 2]
@@ -93,7 +96,7 @@ def test_what_the_gel_touched_nothing_of_is_not_of_the_object(off: float) -> Non
     shift = np.array([0.0, 0.0, off])  # an error that all places of the contact share
     touch = replace(touch, points=touch.points + shift, clear=touch.clear + shift)
     wide = FamilyShape(shape.name, shape.code, shape.theta.copy())
-    wide.theta[[layout.SHAFT_A, layout.SHAFT_B]] += np.log(3.0)
+    wide.theta[[tool.SLOT.shaft_a, tool.SLOT.shaft_b]] += np.log(3.0)
     told, untold = (
         observe(shape_readings((one,), None)) for one in (touch, replace(touch, clear=np.empty((0, 3))))
     )
@@ -161,7 +164,7 @@ def test_a_vessel_in_front_of_what_was_not_seen_costs_the_same_however_thin_its_
     costs = []
     for wall in (1e-3, 8e-3):
         tray = draw_shape("tray", np.random.default_rng(0))
-        tray.theta[layout.WALL] = np.log(wall)
+        tray.theta[revolution.SLOT.wall] = np.log(wall)
         costs.append(cost_of(tray, seen))
     assert costs[0] == pytest.approx(costs[1], rel=1e-9)
 
@@ -170,12 +173,12 @@ def test_a_thin_board_far_outside_of_the_mask_is_wrong_by_more_than_it_is_thick(
     _, readings = made("mug")
     seen = observe(replace(readings, touches=()))
     board = draw_shape("board", np.random.default_rng(0))
-    board.theta[layout.HEIGHT], board.theta[layout.X] = np.log(0.06), 0.12
+    board.theta[revolution.SLOT.height], board.theta[layout.X] = np.log(0.06), 0.12
     out = rows_for(seen)
     evaluate(board.code, board.theta, seen, False, out, prepared_room())
     passing = out.values[-len(seen.rays.kinds) :][seen.rays.kinds == PASS]
     met = passing[passing < 0.0]
-    thick = np.exp(board.theta[layout.RADII])
+    thick = np.exp(board.theta[revolution.SLOT.radii])
     assert len(met) > 3
     assert np.median(-met) * seen.rays.pixel > 3.0 * thick
 
@@ -212,8 +215,8 @@ def test_sides_are_proposed_that_span_the_contacts() -> None:
         for laid in lay(draw_shape("tray", random), guides, random, readings.place_error, 4):
             if abs(np.sin(2.0 * laid[layout.YAW])) > 0.2:
                 continue
-            corner = np.exp(laid[layout.RADII : layout.RADII + layout.KNOTS].max())
-            sides = 2.0 * (np.exp(laid[[layout.CORE_X, layout.CORE_Y]]) + corner)
+            corner = np.exp(laid[revolution.SLOT.radii].max())
+            sides = 2.0 * (np.exp(laid[[revolution.SLOT.core_x, revolution.SLOT.core_y]]) + corner)
             fitting += bool((np.abs(np.sort(sides) / np.sort(high - low)[1:] - 1.1) < 0.12).all())
     assert fitting >= 5
 
@@ -221,11 +224,11 @@ def test_sides_are_proposed_that_span_the_contacts() -> None:
 def test_a_vessel_much_longer_than_wide_is_rare() -> None:
     tray = draw_shape("tray", np.random.default_rng(0))
     ordinary = rarity(tray)
-    tray.theta[[layout.CORE_X, layout.CORE_Y]] = np.log([0.2, 0.001])
+    tray.theta[[revolution.SLOT.core_x, revolution.SLOT.core_y]] = np.log([0.2, 0.001])
     assert rarity(tray) == pytest.approx(ordinary + SOLID)
     solid = draw_shape("packet", np.random.default_rng(0))
     before = rarity(solid)
-    solid.theta[[layout.CORE_X, layout.CORE_Y]] = np.log([0.2, 0.001])
+    solid.theta[[revolution.SLOT.core_x, revolution.SLOT.core_y]] = np.log([0.2, 0.001])
     assert rarity(solid) == pytest.approx(before)
 
 

@@ -3,15 +3,9 @@
 import numpy as np
 import pytest
 
-from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import (
-    CLASSES,
-    FamilyShape,
-    draw_shape,
-    rarity_of_size,
-    size_of,
-)
-from experiments.shape_reconstruction.family.freedom import SIZES
+from experiments.shape_reconstruction.family import revolution_distance as revolution
+from experiments.shape_reconstruction.family.kind import FamilyShape
+from experiments.shape_reconstruction.family.kinds import CLASSES, draw_shape, kind_of, rarity_of_size
 from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
 from tests.support.family_shapes import surface_of
@@ -23,7 +17,7 @@ ORDINARY, RARE = 3.0, 5.0
 
 def scaled(shape: FamilyShape, factor: float) -> FamilyShape:
     theta = shape.theta.copy()
-    theta[list(SIZES[int(shape.code[layout.KIND])])] += np.log(factor)
+    theta[list(kind_of(shape.code).lengths)] += np.log(factor)
     return FamilyShape(shape.name, shape.code, theta)
 
 
@@ -45,9 +39,9 @@ def test_the_farther_a_size_is_from_all_draws_the_rarer(name: str, factor: float
 
 def squat(name: str, half: float, height: float) -> FamilyShape:
     shape = draw_shape(name, np.random.default_rng(5))
-    wide, _ = size_of(shape.code, shape.theta)
-    shape.theta[layout.RADII : layout.RADII + layout.KNOTS] += np.log(half / wide)
-    shape.theta[layout.HEIGHT] = np.log(height)
+    wide, _ = kind_of(shape.code).extent(shape.code, shape.theta)
+    shape.theta[revolution.SLOT.radii] += np.log(half / wide)
+    shape.theta[revolution.SLOT.height] = np.log(height)
     return shape
 
 

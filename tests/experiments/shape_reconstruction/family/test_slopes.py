@@ -48,7 +48,7 @@ def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: s
     np.testing.assert_allclose(base[~seen_by_rays], out.values[rows][~seen_by_rays], atol=1e-9)
     # A ray is held where it is nearest, which is found to half a step as costs are computed.
     assert np.all(base[seen_by_rays] < out.values[rows][seen_by_rays] + 0.15)
-    direction = np.zeros(layout.SIZE)
+    direction = np.zeros(len(theta))
     direction[layout.X] = 0.5e-3  # far beyond what a ray searched anew may be off
     frozen(shape.code, theta + direction, seen, rows, out, False, q, moved)
     again = rows_for(seen)
@@ -97,7 +97,7 @@ def test_the_slope_along_every_direction_is_that_of_its_rows(name: str) -> None:
 
 _FIT = """
 import numpy as np
-from experiments.shape_reconstruction.family.classes import CLASSES, draw_shape
+from experiments.shape_reconstruction.family.kinds import CLASSES, draw_shape
 from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
 from tests.support.family_readings import made
