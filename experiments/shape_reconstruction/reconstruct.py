@@ -211,8 +211,8 @@ def predict_left_out(fit: FamilyFit, evidence: ShapeEvidence) -> FloatArray:
     for fold in folds_of(len(contacts)):
         kept = evidence.without(fold)
         search = FamilySearch(kept, FamilySettings())
-        begun = [search.seeded(one.shape, one.prior.middle) for one in fit.mixture.hypotheses[:HYPOTHESES]]
-        fits = [search.refined(one, ROUNDS, last=True) for one in begun]
+        begun = [search.start(one.shape, one.prior.middle) for one in fit.mixture.hypotheses[:HYPOTHESES]]
+        fits = [search.refine(one, ROUNDS, last=True) for one in begun]
         shape = min(fits, key=lambda one: one.cost).shape
         bent_to = moved_points(shape, kept, np.ones(len(kept.contacts), bool))
         typical = contact_fit(shape, search.full).typical

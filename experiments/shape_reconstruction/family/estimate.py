@@ -100,8 +100,8 @@ def fit_family(
             "contact or one silhouette: press at the object, or take its picture"
         )
     search = FamilySearch(evidence, settings)
-    started = [search.seeded(seed.shape, seed.prior.middle) for seed in seeds]
-    hypotheses = _at_stated_place(search.found(started), evidence)
+    started = [search.start(seed.shape, seed.prior.middle) for seed in seeds]
+    hypotheses = _at_stated_place(search.run(started), evidence)
     mixture = mixture_of(hypotheses, evidence.sighted, bool(evidence.contacts), settings.seed)
     turned = turned_contacts(mixture.best.shape, evidence)
     fit, nuisance = contact_fit(mixture.best.shape, search.full), search.nuisance(mixture.best.shape)

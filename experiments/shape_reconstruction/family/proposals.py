@@ -58,18 +58,20 @@ class Guides:
         return np.asarray(self.eye[:2] + away[:, None] * down[:, :2])
 
 
-def lay(shape: FamilyShape, guides: Guides, random: Random, place_error: float, yaws: int) -> FloatArray:
-    """Vectors of a draw at a place and in a size of the readings, at several turns.
+def place_sample(
+    shape: FamilyShape, guides: Guides, random: Random, place_error: float, yaws: int
+) -> FloatArray:
+    """Move and scale a sample to the readings, at several yaws.
 
     Args:
-        shape: about the origin.
-        guides: of the readings.
-        random: choices between what the readings allow.
-        place_error: m, where nothing was read.
-        yaws: turns, one where a turn changes nothing.
+        shape: a sample at the origin.
+        guides: proposals of the readings.
+        random: chooses between the proposals.
+        place_error: standard deviation of the position without a reading, m.
+        yaws: number of yaws; one where a rotation changes nothing.
 
     Returns:
-        ``(yaws, SIZE)``.
+        ``(yaws, size)`` vectors.
     """
     theta, kind = shape.theta.copy(), kind_of(shape.code)
     turn = None
@@ -79,8 +81,8 @@ def lay(shape: FamilyShape, guides: Guides, random: Random, place_error: float, 
     theta[list(kind.lengths)] += _log_scale(shape, guides, random, turn)
     theta[layout.X : layout.Y + 1] = _middle(shape, theta, guides, random, place_error)
     count = yaws if kind.has_yaw(shape.code) else 1
-    laid = np.repeat(theta[None], count, axis=0)
-    # Turns that the readings propose and their opposites, then any, evenly spread.
+    placed = np.repeat(theta[None], count, axis=0)
+    # Yaws that the readings propose and their opposites, then any, evenly spread.
     turns = random.uniform(0.0, 2.0 * np.pi) + 2.0 * np.pi * np.arange(count) / count
     if turn is not None:
         proposed = turn + np.pi * np.arange(count) + random.normal(0.0, 0.05, count)
@@ -88,10 +90,10 @@ def lay(shape: FamilyShape, guides: Guides, random: Random, place_error: float, 
     elif len(guides.turns):
         few = (count + 1) // 3
         turns[:few] = random.choice(guides.turns, few) + 0.5 * np.pi * random.integers(0, 4, few)
-    laid[:, layout.YAW] = turns
+    placed[:, layout.YAW] = turns
     if kind.has_sides(shape.code) and len(guides.places) >= ENOUGH and random.random() < SPANNED:
         # A body with straight sides has the sides and the middle of the contacts' box, as it is turned.
-        for one in laid:
+        for one in placed:
             cosine, sine = np.cos(one[layout.YAW]), np.sin(one[layout.YAW])
             along = guides.places[:, :2] @ np.array([[cosine, -sine], [sine, cosine]])
             low, high = along.min(axis=0), along.max(axis=0)
@@ -100,11 +102,11 @@ def lay(shape: FamilyShape, guides: Guides, random: Random, place_error: float, 
             one[layout.X] = cosine * middle[0] - sine * middle[1]
             one[layout.Y] = sine * middle[0] + cosine * middle[1]
             kind.set_sides(one, half)
-    return laid
+    return placed
 
 
 def _log_scale(shape: FamilyShape, guides: Guides, random: Random, turn: float | None) -> float:
-    """By which all lengths of a draw are scaled, so that it is as large as what was seen or touched."""
+    """Compute the logarithm of the factor that makes a sample as large as the contacts or the silhouette."""
     if random.random() < OWN or not (guides.sighted or guides.touched):
         return 0.0
     half, height = kind_of(shape.code).extent(shape.code, shape.theta)
@@ -223,12 +225,12 @@ def _by_sight(evidence: ShapeEvidence) -> tuple[FloatArray, FloatArray, FloatArr
     return (high - low) / look.focal_length, look.stand_from_camera[:3, 3].copy(), ray, outline
 
 
-ASIDE, ASIDE_PLACE, ASIDE_TURN = 0.15, 2.0e-3, 0.1
-"""Deviation of a shape beside another: of its own numbers, in deviations of their prior; of its place, in m
-along x and y; of its turn, in rad."""
+PERTURBATION, PERTURBATION_PLACE, PERTURBATION_YAW = 0.15, 2.0e-3, 0.1
+"""Standard deviations of a perturbed shape: of its parameters, in deviations of their prior; of its position
+along x and y, m; of its yaw, rad."""
 
 
-def changes(shape: FamilyShape, random: Random) -> Iterator[FamilyShape]:
+def change(shape: FamilyShape, random: Random) -> Iterator[FamilyShape]:
     """Yield shapes that differ from one by one part or by a rotation."""
     kind = kind_of(shape.code)
     if kind.has_yaw(shape.code):
@@ -236,13 +238,13 @@ def changes(shape: FamilyShape, random: Random) -> Iterator[FamilyShape]:
     yield from kind.changes(shape, random)
 
 
-def beside(shape: FamilyShape, random: Random) -> FamilyShape:
-    """The same parts with all numbers a little off: fitted anew, it may find a better valley nearby."""
+def perturb(shape: FamilyShape, random: Random) -> FamilyShape:
+    """Return a shape with slightly different numbers: fitted again, it may reach a better local minimum."""
     theta = shape.theta.copy()
     kind = kind_of(shape.code)
     for slot, sigma in kind.deviations(shape.code).items():
-        theta[slot] += ASIDE * sigma * random.standard_normal()
-    theta[layout.X : layout.Y + 1] += ASIDE_PLACE * random.standard_normal(2)
+        theta[slot] += PERTURBATION * sigma * random.standard_normal()
+    theta[layout.X : layout.Y + 1] += PERTURBATION_PLACE * random.standard_normal(2)
     if kind.has_yaw(shape.code):
-        theta[layout.YAW] += ASIDE_TURN * random.standard_normal()
+        theta[layout.YAW] += PERTURBATION_YAW * random.standard_normal()
     return FamilyShape(shape.name, shape.code, theta)

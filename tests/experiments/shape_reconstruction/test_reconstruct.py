@@ -45,6 +45,9 @@ def fit_of(residual: float = 0.1, nuisance: float = 0.0, rival: float = 0.0, cos
     """A fit whose contacts are off by so many times ``LOOSE``."""
     return family_fit(
         mixture_of(*SHAPES, weights=(1.0 - rival, rival), cost=cost),
+        mesh=SMOOTH.mesh,
+        deviation=SMOOTH.deviation,
+        known_by=SMOOTH.known_by,
         contact_cost=residual * LOOSE,
         nuisance=NuisanceCost(nuisance, ""),
     )

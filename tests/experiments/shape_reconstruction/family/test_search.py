@@ -13,18 +13,13 @@ from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, shape_rows
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.kinds import draw_shape, rarity
+from experiments.shape_reconstruction.family.minimize import PriorRows, cheapest, minimize, total_cost
 from experiments.shape_reconstruction.family.observed import PASS, FamilyEvidence, observe
 from experiments.shape_reconstruction.family.posterior import mixture_of
-from experiments.shape_reconstruction.family.proposals import guides_of, lay
+from experiments.shape_reconstruction.family.proposals import guides_of, place_sample
 from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
 from experiments.shape_reconstruction.family.revolution import SOLID
-from experiments.shape_reconstruction.family.search import (
-    FamilySearch,
-    PriorRows,
-    cheapest,
-    refine,
-    total_cost,
-)
+from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
 from harness.basics.geometry import apply, transform, translation
 from tests.support.family_readings import made, nudged
@@ -113,7 +108,7 @@ def test_refining_never_costs_more_and_finds_the_way_back(name: str) -> None:
     before = total_cost(shape.code, theta, seen, prior, False, rows_for(seen), prepared_room())
     costs = [before]
     for rounds in (2, 12):
-        found, cost, curvature = refine(shape.code, theta, seen, prior, basis, False, rounds)
+        found, cost, curvature = minimize(shape.code, theta, seen, prior, basis, False, rounds)
         costs.append(cost)
         assert np.isfinite(found).all()
         assert np.linalg.eigvalsh(curvature).min() >= -1e-6 * np.abs(curvature).max()
@@ -186,9 +181,9 @@ def test_a_thin_board_far_outside_of_the_mask_is_wrong_by_more_than_it_is_thick(
 def test_a_hypothesis_found_twice_counts_once() -> None:
     shape, readings = made("mug")
     search = FamilySearch(readings, LEVELS["coarse"])
-    best = search.refined(search.seeded(shape, shape.theta), 8, last=True)
+    best = search.refine(search.start(shape, shape.theta), 8, last=True)
     near = replace(shape, theta=best.shape.theta + 1e-5)
-    beside = search.refined(search.seeded(near, shape.theta), 1, last=True)
+    beside = search.refine(search.start(near, shape.theta), 1, last=True)
     assert len(mixture_of([best, beside], True, True, 0).hypotheses) == 1
 
 
@@ -197,7 +192,7 @@ def test_looking_beside_the_best_finds_better_and_loses_nothing_that_was_likely(
     for name in ("tray", "spanner"):
         _, readings = made(name)
         without, with_hops = (
-            FamilySearch(readings, replace(LEVELS["coarse"], hops=hops)).found() for hops in (0, 2)
+            FamilySearch(readings, replace(LEVELS["coarse"], hops=hops)).run() for hops in (0, 2)
         )
         assert with_hops[0].cost < without[0].cost + 1e-3
         likely = {one.shape.code.tobytes() for one in without[: LEVELS["coarse"].finals - 1]}
@@ -212,7 +207,7 @@ def test_sides_are_proposed_that_span_the_contacts() -> None:
     low, high = guides.places.min(axis=0), guides.places.max(axis=0)
     fitting = 0
     for _ in range(40):
-        for laid in lay(draw_shape("tray", random), guides, random, readings.place_error, 4):
+        for laid in place_sample(draw_shape("tray", random), guides, random, readings.place_error, 4):
             if abs(np.sin(2.0 * laid[layout.YAW])) > 0.2:
                 continue
             corner = np.exp(laid[revolution.SLOT.radii].max())

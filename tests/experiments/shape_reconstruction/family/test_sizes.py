@@ -55,6 +55,6 @@ def test_a_rare_size_costs_where_hypotheses_are_ranked() -> None:
     mesh = surface_of(bowl)
     search = FamilySearch(shape_readings(touches_on(mesh, 2, seed=1), look_at(mesh)), LEVELS["coarse"])
     glass = FamilyShape("stemmed glass", bowl.code, bowl.theta)
-    named, misnamed = (search.refined(search.seeded(one, one.theta), 4) for one in (bowl, glass))
+    named, misnamed = (search.refine(search.start(one, one.theta), 4) for one in (bowl, glass))
     assert named.misfit == pytest.approx(misnamed.misfit, rel=1e-6)
     assert misnamed.cost > named.cost + RARE

@@ -103,7 +103,7 @@ from experiments.shape_reconstruction.family.settings import LEVELS
 from tests.support.family_readings import made
 search, random = FamilySearch(made("mug")[1], LEVELS["coarse"]), np.random.default_rng(3)
 for other in [draw_shape(name, random) for name in CLASSES for _ in range(12)]:
-    found = search.refined(search.seeded(other, other.theta), 2, last=True)
+    found = search.refine(search.start(other, other.theta), 2, last=True)
     print(found.cost.hex(), *(number.hex() for number in found.shape.theta.tolist()))
 """
 

@@ -112,7 +112,7 @@ def test_hypotheses_away_from_the_stated_place_or_too_large_are_left_out(
     from experiments.shape_reconstruction.family.search import FamilySearch
     from experiments.shape_reconstruction.family.settings import LEVELS
 
-    found = FamilySearch(TOUCHED, replace(LEVELS["coarse"], draws=42, starts=4, refined=2, hops=0)).found()
+    found = FamilySearch(TOUCHED, replace(LEVELS["coarse"], draws=42, starts=4, refined=2, hops=0)).run()
     near = found[0]
     theta = near.shape.theta.copy()
     theta[0] = 1.01 * max_offset(TOUCHED)
