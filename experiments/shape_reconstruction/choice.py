@@ -10,27 +10,21 @@ import numpy as np
 
 from experiments.shape_reconstruction.fits import FamilyFit, SmoothFit
 from experiments.shape_reconstruction.surface import TOUCHED, ShapeEstimate
+from experiments.shape_reconstruction.thresholds import (
+    ASSUMED_DEVIATION,
+    MAX_BEYOND_CONTACTS,
+    MAX_NUISANCE_OF_FEW,
+    MAX_OUTLINE_ERROR,
+    MAX_SEARCHES,
+    MIN_BLIND_CONTACTS,
+    MIN_BLIND_SEARCHES,
+    MIN_CONTACTS,
+    MIN_LOG_ODDS,
+    MIN_RIVAL_WEIGHT,
+    POOR_CONTACT_COST,
+)
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
-
-MIN_CONTACTS = 6
-"""Contacts at different places that test whether an object is of the family."""
-
-FAMILY_ODDS = 2.0
-"""Log-likelihood by which the smooth surface must predict left-out contacts better: most objects are
-household shapes, and few contacts are a noisy test."""
-
-MAX_OUTLINE_ERROR = 0.05
-"""Share of the silhouette that a shape may miss or add beyond the camera's error. Of 24 development runs
-right answers have up to 0.01 and wrong ones 0.3 and more."""
-
-BLIND_CONTACTS, MAX_BEYOND = 12, 10.0e-3
-"""Contacts without a picture from which on a shape that lies farther beyond them on average, m, is rejected:
-so many presses would have met it there."""
-
-ASSUMED_DEVIATION = 5.1e-3
-"""Standard deviation of a surface that rests on the assumption of the family alone, m: that of the
-single-view prior on held-out shapes."""
 
 
 def choose(fit: FamilyFit | None, smooth: SmoothFit | None, prior: ShapeEstimate | None) -> ShapeEstimate:
@@ -83,11 +77,11 @@ def rejection_reason(fit: FamilyFit, smooth: SmoothFit | None) -> str | None:
             f"the best household shape misses or adds {100.0 * fit.outline_error:.0f} % of the outline in "
             f"the picture, and at most {100.0 * MAX_OUTLINE_ERROR:.0f} % are the camera's error"
         )
-    if not fit.sighted and fit.beyond_contacts > MAX_BEYOND and count >= BLIND_CONTACTS:
+    if not fit.sighted and fit.beyond_contacts > MAX_BEYOND_CONTACTS and count >= MIN_BLIND_CONTACTS:
         return (
             f"the household shape lies {fit.beyond_contacts * 1e3:.0f} mm beyond {count} contacts on average"
         )
-    if smooth is not None and fit.misfit > smooth.misfit + FAMILY_ODDS:
+    if smooth is not None and fit.misfit > smooth.misfit + MIN_LOG_ODDS:
         return (
             f"contacts left out are {fit.prediction_error * 1e3:.1f} mm off the household shape and "
             f"{smooth.prediction_error * 1e3:.1f} mm off the smooth surface"
@@ -108,3 +102,31 @@ def _at_least(found: ShapeEstimate, error: float) -> FloatArray:
     """``(vertices,)`` m: no part that was not touched is surer than predictions of left-out contacts are."""
     floor = np.where(found.known_by == TOUCHED, 0.0, error)
     return np.asarray(np.maximum(found.deviation, floor))
+
+
+def is_poor(fit: FamilyFit) -> bool:
+    """True where the shape fits contacts or outline poorly, or needs excessive bench errors."""
+    poor_contacts = fit.contact_cost > POOR_CONTACT_COST
+    return poor_contacts or fit.nuisance.is_excessive or fit.outline_error > MAX_OUTLINE_ERROR
+
+
+def rank(fit: FamilyFit) -> tuple[bool, float]:
+    """Rank fits: good ones by their cost, then poor ones by their contact residual."""
+    poor = is_poor(fit)
+    return poor, fit.contact_cost if poor else fit.mixture.best.cost
+
+
+def needs_search(best: FamilyFit, made: int) -> bool:
+    """Decide whether one more search is made.
+
+    More are made of what fits poorly, of several classes that fit alike, and without a picture.
+
+    Args:
+        best: the best fit so far.
+        made: searches so far.
+    """
+    many = len(best.left_out) >= MIN_CONTACTS
+    least = 1 if best.sighted or not many else MIN_BLIND_SEARCHES
+    rivals = sum(weight >= MIN_RIVAL_WEIGHT for weight in best.mixture.by_class().values())
+    unsure = rivals > 1 if many else best.nuisance.cost > MAX_NUISANCE_OF_FEW
+    return made < MAX_SEARCHES and (made < least or is_poor(best) or (made == least and unsure))

@@ -5,16 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_erosion, gaussian_filter
 
+from experiments.shape_reconstruction.thresholds import CONTACT_DEPTH, MIN_INDENTATION
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 
 POINTS = 40
 """Points of a press, spread over what was touched."""
-
-SHARE = 0.5
-"""Of the deepest indentation: what lies deeper is the object's own surface, not gel that hangs from it."""
-
-TOUCHED = 0.12e-3
-"""M of indentation below which nothing was touched."""
 
 CLEAR = 12
 """Places of a press, spread over what was not touched."""
@@ -46,9 +41,9 @@ def contact_points(heights: FloatArray, errors: FloatArray, pitch: float) -> Con
         pitch: m of gel that a pixel shows.
     """
     deepest = float(heights.max())
-    if not deepest > TOUCHED:
+    if not deepest > MIN_INDENTATION:
         return None
-    core = heights >= SHARE * deepest
+    core = heights >= CONTACT_DEPTH * deepest
     rows, columns = _spread(core, POINTS)
     points = _on_face(heights.shape, rows, columns, pitch)
     points[:, 2] = -heights[rows, columns]
@@ -61,7 +56,7 @@ def contact_points(heights: FloatArray, errors: FloatArray, pitch: float) -> Con
     )
     normals = np.column_stack([-slopes, -np.ones(len(slopes))])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    clear = _on_face(heights.shape, *_spread(heights < TOUCHED, CLEAR), pitch)
+    clear = _on_face(heights.shape, *_spread(heights < MIN_INDENTATION, CLEAR), pitch)
     return ContactPoints(points, normals, float(np.median(errors[rows, columns])), clear)
 
 

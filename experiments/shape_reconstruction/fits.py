@@ -7,11 +7,8 @@ import numpy as np
 from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.surface import ShapeEstimate
+from experiments.shape_reconstruction.thresholds import PREDICTION_SCALE
 from harness.basics.arrays import FloatArray
-
-PREDICTION_SCALE = 2.0e-3
-"""Scale of the Cauchy density of a left-out contact's distance, m: a slipped contact counts little."""
-
 
 FOLDS = 8
 """Parts in which contacts are left out: the time of a prediction does not grow with their number."""

@@ -8,21 +8,15 @@ import numpy as np
 from scipy import ndimage
 
 from experiments.shape_reconstruction.choice import (
-    MAX_OUTLINE_ERROR,
-    MIN_CONTACTS,
     choose,
+    is_poor,
+    needs_search,
+    rank,
     rejection_reason,
 )
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.family.contact_fit import contact_fit, displacement, moved_points
-from experiments.shape_reconstruction.family.estimate import (
-    LOOSE,
-    OUTSIDE,
-    POINT_SIGMA,
-    RIVAL,
-    fit_family,
-    open_without_class,
-)
+from experiments.shape_reconstruction.family.estimate import POINT_SIGMA, fit_family, open_without_class
 from experiments.shape_reconstruction.family.observed import directions_of
 from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
 from experiments.shape_reconstruction.family.settings import ANEW, FamilySettings
@@ -33,16 +27,15 @@ from experiments.shape_reconstruction.smooth.bent_prior import bend_prior
 from experiments.shape_reconstruction.smooth.free_space import shift_sigma
 from experiments.shape_reconstruction.smooth.hermite import by_hermite
 from experiments.shape_reconstruction.surface import ShapeEstimate
+from experiments.shape_reconstruction.thresholds import (
+    MAX_OUTLINE_ERROR,
+    MIN_CONTACTS,
+    OUTSIDE_CONTACT_COST,
+)
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, OutOfDomain
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.mesh import Mesh
-
-SEARCHES, BLIND_SEARCHES = 3, 2
-"""Searches of a shape that no search fits well; of one without a picture, at least."""
-
-UNEASY = 4.0
-"""Nuisance-parameter cost of an answer by few contacts above which one more search is made."""
 
 
 def reconstruct_with_prior(evidence: ShapeEvidence, settings: FamilySettings | None = None) -> ShapeEstimate:
@@ -121,25 +114,13 @@ def _smooth(evidence: ShapeEvidence) -> SmoothFit | None:
 
 
 def _search(evidence: ShapeEvidence, settings: FamilySettings, smooth: SmoothFit | None) -> FamilyFit:
-    """Fit the family by one to three searches, each with its own draws, and return the best fit.
-
-    More searches are made of what fits poorly, of several classes that fit alike, and without a picture,
-    where the cost has more local minima. Of good fits the least cost is taken, of poor ones the least contact
-    residual.
-    """
+    """Fit the family by one to three searches, each with its own draws, and return the best fit."""
     best = _fit(evidence, settings)
-    seconds = best.seconds
-    many = len(evidence.contacts) >= MIN_CONTACTS
-    least = 1 if evidence.sighted or not many else BLIND_SEARCHES
-    for more in range(1, SEARCHES):
-        rivals = sum(weight >= RIVAL for weight in best.mixture.by_class().values())
-        unsure = rivals > 1 if many else best.nuisance.cost > UNEASY
-        again = _is_poor(best) or (more == least and unsure)
-        if more >= least and not again:
-            break
-        found = _fit(evidence, replace(settings, seed=settings.seed + more))
-        seconds += found.seconds
-        best = min(best, found, key=_rank)
+    seconds, made = best.seconds, 1
+    while needs_search(best, made):
+        found = _fit(evidence, replace(settings, seed=settings.seed + made))
+        seconds, made = seconds + found.seconds, made + 1
+        best = min(best, found, key=rank)
     return _with_predictions(best, evidence, smooth, seconds)
 
 
@@ -152,7 +133,7 @@ def _continue(
     """Fit the family from earlier hypotheses; repeat a poor fit by a new search next to its hypotheses."""
     found = _fit(evidence, settings, seeds)
     found = _with_predictions(found, evidence, smooth, found.seconds)
-    if not _is_poor(found) and rejection_reason(found, smooth) is None:
+    if not is_poor(found) and rejection_reason(found, smooth) is None:
         return found
     again = _fit(evidence, replace(ANEW, seed=settings.seed), found.mixture.hypotheses)
     return _with_predictions(again, evidence, smooth, found.seconds + again.seconds)
@@ -173,17 +154,6 @@ def _with_predictions(
     if smooth is None or rejection_reason(fit, None) is not None:
         return fit
     return replace(fit, left_out=predict_left_out(fit, evidence))
-
-
-def _is_poor(fit: FamilyFit) -> bool:
-    """True where the shape fits contacts or outline poorly, or needs excessive bench errors."""
-    return fit.contact_cost > LOOSE or fit.nuisance.is_excessive or fit.outline_error > MAX_OUTLINE_ERROR
-
-
-def _rank(fit: FamilyFit) -> tuple[bool, float]:
-    """Good fits go before poor ones, by their cost; poor ones by their contact residual."""
-    poor = _is_poor(fit)
-    return poor, fit.contact_cost if poor else fit.mixture.best.cost
 
 
 HYPOTHESES, ROUNDS = 3, 10
@@ -215,8 +185,8 @@ def predict_left_out(fit: FamilyFit, evidence: ShapeEvidence) -> FloatArray:
         fits = [search.refine(one, ROUNDS, last=True) for one in begun]
         shape = min(fits, key=lambda one: one.cost).shape
         bent_to = moved_points(shape, kept, np.ones(len(kept.contacts), bool))
-        typical = contact_fit(shape, search.full).typical
-        far = float(np.sqrt(np.mean(np.sum(bent_to[1] ** 2, axis=1)))) if typical > OUTSIDE else 0.0
+        is_outside = contact_fit(shape, search.full).typical > OUTSIDE_CONTACT_COST
+        far = float(np.sqrt(np.mean(np.sum(bent_to[1] ** 2, axis=1)))) if is_outside else 0.0
         for k in fold:
             which = np.array([one is contacts[k] for one in contacts])
             points, offsets = moved_points(shape, evidence, which)

@@ -17,6 +17,7 @@ from experiments.shape_reconstruction.family.rays import first_met
 from experiments.shape_reconstruction.fits import FamilyFit
 from experiments.shape_reconstruction.section import Choice
 from experiments.shape_reconstruction.surface import ShapeEstimate
+from experiments.shape_reconstruction.thresholds import MIN_EXPECTED_ERROR
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import frame_facing, rotation_about, transform
@@ -86,9 +87,6 @@ off real ones."""
 MOST = 18.0
 """Half squares that two readings differ by at most, and a line that is met and one that is not."""
 
-AGREE = 1.0e-3
-"""M of expected error below which shapes are alike, and a press goes where none was."""
-
 CELL, MOST_CELLS, NEAR = 5.0e-3, 60, 0.6
 """M of the grid on which shapes are compared, how many cells it has along a side, and how near to a surface,
 in cells, a place of it is of that."""
@@ -122,7 +120,7 @@ def error_spared(evidence: ShapeEvidence, estimate: ShapeEstimate, lines: FloatA
         shares += [float(weight) / len(every)] * len(every)
     weights, apart = np.array(shares), distances_apart(shapes)
     now = bayes_risk(weights, apart)
-    if now < AGREE:
+    if now < MIN_EXPECTED_ERROR:
         return None
     face = evidence.housing, evidence.gel_thickness
     read = readings_on(shapes, lines, max(BEFORE, 0.5 * evidence.largest), face)

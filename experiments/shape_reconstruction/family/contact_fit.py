@@ -18,17 +18,18 @@ from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, farthest_points
 from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
+from experiments.shape_reconstruction.thresholds import (
+    MAX_NORMAL_SPREAD,
+    MIN_OUTLIER_COST,
+    MIN_OUTLIER_DISTANCE,
+    MIN_OUTLIER_RATIO,
+    MIN_PATCH_WIDTH,
+    MIN_TILT,
+    MIN_TILT_GAIN,
+    MIN_TILT_RATIO,
+)
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.geometry import rotation_from_vector
-
-STRANGE = 16.0
-"""A contact's sum of squares, of some five numbers, from which on it may be doubted."""
-
-ALONE = 5.0
-"""By how many times it exceeds the median contact's: where all are off, the shape is, not the contacts."""
-
-LEAST_OFF = 1.0e-3
-"""M that a doubtful contact is off at least: normals at edges differ without being wrong."""
 
 _PROBE = 0.5e-3
 _MOVED_POINTS = 8
@@ -59,8 +60,8 @@ def contact_fit(shape: FamilyShape, seen: FamilyEvidence) -> ContactFit:
     if count:
         squares = (out.values[: len(seen.points)] * seen.sigma[seen.touch]) ** 2
         off = np.sqrt(np.bincount(seen.touch, squares, count) / np.bincount(seen.touch, minlength=count))
-    strange = (sums > STRANGE) & (off > LEAST_OFF)
-    doubtful = strange & (sums > ALONE * np.median(sums)) if count else strange
+    strange = (sums > MIN_OUTLIER_COST) & (off > MIN_OUTLIER_DISTANCE)
+    doubtful = strange & (sums > MIN_OUTLIER_RATIO * np.median(sums)) if count else strange
     linear = np.sqrt(SLIPPED * sums) - 0.5 * SLIPPED
     by_contacts = float(np.where(sums <= SLIPPED, 0.5 * sums, linear).sum())
     return ContactFit(sums, off, doubtful, cost - by_contacts)
@@ -108,13 +109,6 @@ POINT_SIGMA, NORMAL_SIGMA = 0.6e-3, float(np.radians(4.0))
 SHIFT_SIGMA = (1.0e-3, 1.0e-3, 2.0e-3)
 """M along x, y and z of the gel that the nearest shape lies beside a real one at a contact."""
 
-TURNED, APART, GAIN = float(np.radians(9.0)), 3.0, 8.0
-"""Rad, times the median contact, and the sum of squares: more than errors of gel and shape explain."""
-
-WIDE, SMOOTH = 1.2e-3, float(np.radians(10.0))
-"""M rms of a contact's points across its narrower side, and rad of its normals about their mean: of a press
-on an edge normals are off by 30 degrees and more at a right pose."""
-
 TILT_SIGMA = float(np.radians(30.0))
 
 OUT, STEP = 1.5e-3, 1.0e-3
@@ -128,7 +122,7 @@ _ROUNDS = 5
 def turned_contacts(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
     """``(contacts,)`` rad by which the pose of each contact is turned against a shape; 0 where it is right.
 
-    It is turned where it fits much better turned, by more than ``TURNED`` and thrice as far as the others.
+    It is turned where it fits much better turned, by more than ``MIN_TILT`` and thrice as far as the others.
     Contacts of edges and corners are not judged, and 0.
     """
     found = np.zeros(len(evidence.contacts))
@@ -138,7 +132,7 @@ def turned_contacts(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
         middle = touch.points.mean(axis=0)
         widths = np.linalg.svd(touch.points - middle, compute_uv=False) / np.sqrt(len(touch.points))
         spread = np.arccos(np.clip(touch.normals @ touch.mean_normal, -1.0, 1.0))
-        if len(widths) > 1 and widths[1] > WIDE and spread.mean() < SMOOTH:
+        if len(widths) > 1 and widths[1] > MIN_PATCH_WIDTH and spread.mean() < MAX_NORMAL_SPREAD:
             judged.append(k)
     if not judged:
         return found
@@ -148,8 +142,8 @@ def turned_contacts(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
         _, shifted = _least(shape, patch, 3)
         moved, turned = _least(shape, patch, 5)
         tilts[row], gains[row] = np.linalg.norm(moved[3:]), shifted - turned
-    least = max(TURNED, APART * float(np.median(tilts)))
-    found[judged] = np.where((tilts > least) & (gains > GAIN), tilts, 0.0)
+    least = max(MIN_TILT, MIN_TILT_RATIO * float(np.median(tilts)))
+    found[judged] = np.where((tilts > least) & (gains > MIN_TILT_GAIN), tilts, 0.0)
     return found
 
 

@@ -29,53 +29,41 @@ from experiments.shape_reconstruction.smooth.contact_samples import all_samples
 from experiments.shape_reconstruction.smooth.free_space import silhouette_of
 from experiments.shape_reconstruction.smooth.knowledge import beyond_deviation, limited_sides
 from experiments.shape_reconstruction.smooth.knowledge import not_bounded as open_axes
-from experiments.shape_reconstruction.smooth.stated_space import TOO_LONG, longest_side, max_offset
+from experiments.shape_reconstruction.smooth.stated_space import longest_side, max_offset
 from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED
+from experiments.shape_reconstruction.thresholds import (
+    BLIND_FACTOR,
+    BORDER_DISTANCE,
+    FAMILY_TOUCH_DISTANCE,
+    MAX_BEYOND_LAST,
+    MAX_HIDDEN_BORDER,
+    MAX_LENGTH_RATIO,
+    MAX_OUTLIER_FRACTION,
+    MIN_DEVIATION,
+    MIN_LIMITING_NORMAL,
+    MIN_RIVAL_WEIGHT,
+    MISFIT_GAIN,
+    OUTSIDE_CONTACT_COST,
+    POOR_CONTACT_COST,
+    SPREAD_FACTOR,
+    UNDERSIDE_DEVIATION,
+    UNDERSIDE_HEIGHT,
+    UNDERSIDE_NORMAL,
+)
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.errors import FitRefused, OutOfDomain
 from harness.basics.geometry import apply, inverse
 from harness.basics.mesh import Mesh
 
-NOISE = 0.6e-3
-"""M: deviation of a surface that all hypotheses agree about."""
-
-WIDER = 1.2
-"""Factor on the hypotheses' spread: few of them are kept, and their costs are of one likelihood."""
-
-BLIND = 1.3
-"""Factor on every deviation where there is no picture: hypotheses are then of few of the valleys of the cost.
-Found on 24 development runs, as UNDERSIDE is, beside a WIDER of 1.4; at 1.4 here the bands of 30 other runs,
-seeds 5141 to 5145, held 92 % of the truth and 98 % of the answer."""
-
-UNDERSIDE, AT_SUPPORT, DOWNWARD = 1.5e-3, 5.0e-3, -0.5
-"""M of deviation more, below so many m above the support, of what faces down by so much: no gel and no camera
-gets there, and feet, foot rings and hollows of some mm are common."""
-
 SPREAD_OVER = 4
 """Of the shapes drawn about each hypothesis, over which the spread at every vertex is taken."""
-
-MISFIT = 0.5
-"""By how much of a contact's typical sum of squares the variance grows: a shape that is off its contacts is
-wrong elsewhere too."""
-
-OUTSIDE = 6.0
-"""A contact's typical sum of squares, of some five numbers, above which the object is of no class."""
-
-LOOSE = 8.0
-"""The same above which the class does not limit what no reading does."""
 
 POINT_SIGMA = 1.6e-3
 """One standard deviation of each of the eight points of a contact that a surface is moved to, m: they err
 together, and each counts as a part of it."""
 
-SLIPPING = 0.15
-"""Share of contacts that may have slipped."""
-
 FINER = "if they did not slip, a finer search may fit them: shape.method=family-fine, in thrice family's time"
 """Said where several contacts do not fit: a search may have missed the shape."""
-
-RIVAL = 0.2
-"""Weight of a second class above which the class is unknown."""
 
 
 def fit_family(
@@ -115,7 +103,7 @@ def fit_family(
         mesh=mesh,
         deviation=_deviation(plain, mixture, mesh, fit, evidence.sighted),
         known_by=known_by(mesh.vertices, evidence),
-        not_bounded=not_bounded(evidence, mesh, fit.typical > LOOSE or nuisance.is_excessive),
+        not_bounded=not_bounded(evidence, mesh, fit.typical > POOR_CONTACT_COST or nuisance.is_excessive),
         doubtful={
             touch.index: float(off)
             for touch, off, bad in zip(evidence.contacts, fit.off, rejected, strict=True)
@@ -141,7 +129,7 @@ def _at_stated_place(hypotheses: list[Hypothesis], evidence: ShapeEvidence) -> l
     Raises:
         FitRefused: there is none.
     """
-    limit = TOO_LONG * evidence.largest
+    limit = MAX_LENGTH_RATIO * evidence.largest
     kept = [
         one
         for one in hypotheses
@@ -174,7 +162,7 @@ def _by_picture_alone(found: FamilyFit, evidence: ShapeEvidence) -> FamilyFit:
 def _warped(mesh: Mesh, shape: FamilyShape, evidence: ShapeEvidence, fit: ContactFit) -> Mesh:
     places, offsets = moved_points(shape, evidence, ~_outliers(fit))
     sigma = np.full(len(places), POINT_SIGMA)
-    far = float(np.sqrt(np.mean(np.sum(offsets**2, axis=1)))) if fit.typical > OUTSIDE else 0.0
+    far = float(np.sqrt(np.mean(np.sum(offsets**2, axis=1)))) if fit.typical > OUTSIDE_CONTACT_COST else 0.0
     moved = mesh.vertices + displacement(places - offsets, offsets, sigma, mesh.vertices, far)
     return Mesh(moved, mesh.faces)
 
@@ -182,10 +170,9 @@ def _warped(mesh: Mesh, shape: FamilyShape, evidence: ShapeEvidence, fit: Contac
 def _outliers(fit: ContactFit) -> BoolArray:
     """``(contacts,)`` whether each is rejected: it fits none of the rest, and few are so.
 
-    Where more than ``SLIPPING`` of them do not fit, the shape is wrong, and the surface is moved to all of
-    them.
+    Where more do not fit, the shape is wrong, and the surface is moved to all of them.
     """
-    if len(fit.doubtful) and fit.doubtful.mean() > SLIPPING:
+    if len(fit.doubtful) and fit.doubtful.mean() > MAX_OUTLIER_FRACTION:
         return np.zeros_like(fit.doubtful)
     return fit.doubtful
 
@@ -199,9 +186,9 @@ def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh, fit: ContactFit, sight
             gap = distances(shape.code, shape.theta, plain.vertices)
             total += weight / len(shapes) * gap**2
     moved = np.sum((mesh.vertices - plain.vertices) ** 2, axis=1)
-    under = (mesh.vertex_normals[:, 2] < DOWNWARD) & (mesh.vertices[:, 2] < AT_SUPPORT)
-    known = (WIDER**2 * total + 0.25 * moved + NOISE**2) * (1.0 + MISFIT * fit.typical)
-    return np.asarray(np.sqrt(known + UNDERSIDE**2 * under) * (1.0 if sighted else BLIND))
+    under = (mesh.vertex_normals[:, 2] < UNDERSIDE_NORMAL) & (mesh.vertices[:, 2] < UNDERSIDE_HEIGHT)
+    known = (SPREAD_FACTOR**2 * total + 0.25 * moved + MIN_DEVIATION**2) * (1.0 + MISFIT_GAIN * fit.typical)
+    return np.asarray(np.sqrt(known + UNDERSIDE_DEVIATION**2 * under) * (1.0 if sighted else BLIND_FACTOR))
 
 
 def _flags(
@@ -214,10 +201,10 @@ def _flags(
 ) -> list[str]:
     """State rival classes, a poor fit, and the contacts that do not fit, with the reason."""
     flags = []
-    rivals = [name for name, weight in mixture.by_class().items() if weight >= RIVAL]
+    rivals = [name for name, weight in mixture.by_class().items() if weight >= MIN_RIVAL_WEIGHT]
     if len(rivals) > 1:
         flags.append(f"class unknown: {' or '.join(rivals)}")
-    if fit.typical > OUTSIDE:
+    if fit.typical > OUTSIDE_CONTACT_COST:
         flags.append(
             f"outside the family: contacts are {np.median(fit.off) * 1e3:.1f} mm off the nearest such shape"
         )
@@ -247,22 +234,6 @@ def _flags(
     return flags
 
 
-UNDER_GEL = 6.0e-3
-"""M from a contact's points within which a surface counts as touched."""
-
-BORDER = 1.5
-"""Pixels from the silhouette's border within which a surface counts as seen."""
-
-LIMITING = 0.4
-"""Part of a contact's normal along an axis from which on it limits the extent there."""
-
-SHORT = 25.0e-3
-"""M that an answer may go on beyond its last contact along an axis before nothing bounds it there."""
-
-MOST_HIDDEN = 0.4
-"""Share of the silhouette's border that may be hidden before it limits no extent."""
-
-
 def known_by(vertices: FloatArray, evidence: ShapeEvidence) -> IntArray:
     """``(n,)`` ``SUPPOSED``, ``SEEN`` or ``TOUCHED``."""
     known = np.full(len(vertices), SUPPOSED, np.int64)
@@ -276,10 +247,10 @@ def known_by(vertices: FloatArray, evidence: ShapeEvidence) -> IntArray:
         away = ndimage.distance_transform_edt(~(border & ~look.hidden))
         column, row = np.floor(places).astype(np.int64).T
         shown = (column >= 0) & (row >= 0) & (column < columns) & (row < rows) & (in_camera[:, 2] > 0.0)
-        known[np.flatnonzero(shown)[away[row[shown], column[shown]] <= BORDER]] = SEEN
+        known[np.flatnonzero(shown)[away[row[shown], column[shown]] <= BORDER_DISTANCE]] = SEEN
     points = [touch.points for touch in evidence.contacts]
     if points:
-        known[cKDTree(np.concatenate(points)).query(vertices)[0] <= UNDER_GEL] = TOUCHED
+        known[cKDTree(np.concatenate(points)).query(vertices)[0] <= FAMILY_TOUCH_DISTANCE] = TOUCHED
     return known
 
 
@@ -288,7 +259,7 @@ def not_bounded(evidence: ShapeEvidence, mesh: Mesh, outside: bool) -> tuple[str
 
     The silhouette and a class that fits limit it all around. Where the class does not, the silhouette limits
     what the camera looks across, and the rest is limited by contacts near its ends alone. Without a
-    silhouette contacts must look both ways along an axis, and end no more than ``SHORT`` before the answer.
+    silhouette contacts must look both ways along an axis, and end near the end of the answer.
 
     Args:
         evidence: one contact or a silhouette at least.
@@ -301,15 +272,15 @@ def not_bounded(evidence: ShapeEvidence, mesh: Mesh, outside: bool) -> tuple[str
         edge = look.mask.copy()
         edge[1:-1, 1:-1] = False
         hidden = int((around & look.hidden).sum()) + int(edge.sum())
-        if hidden <= MOST_HIDDEN * max(int(around.sum()), 1):  # enough of its border is seen
+        if hidden <= MAX_HIDDEN_BORDER * max(int(around.sum()), 1):  # enough of its border is seen
             return open_without_class(evidence, mesh) if outside else ()
     normals = np.array([touch.mean_normal for touch in evidence.contacts]).reshape(-1, 3)
     supposed = beyond_contacts(mesh.vertices, evidence).max(axis=0)
     free = []
     for axis, name in enumerate("xyz"):
-        upper = bool((normals[:, axis] > LIMITING).any())
-        lower = axis == 2 or bool((normals[:, axis] < -LIMITING).any())
-        if not (upper and lower) or supposed[axis] > SHORT:
+        upper = bool((normals[:, axis] > MIN_LIMITING_NORMAL).any())
+        lower = axis == 2 or bool((normals[:, axis] < -MIN_LIMITING_NORMAL).any())
+        if not (upper and lower) or supposed[axis] > MAX_BEYOND_LAST:
             free.append(name)
     return tuple(free)
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.kinds import kind_of
+from experiments.shape_reconstruction.thresholds import MAX_NUISANCE_COST
 from harness.basics.arrays import FloatArray, IntArray
 
 TILT = float(np.radians(0.8))
@@ -112,10 +113,6 @@ def stand_rows(code: IntArray) -> FloatArray:
     rows += [(_along(kind.size, slot) - width) / 0.3 for slot in kind.proportions(code)]
     return np.array(rows)
 
-
-MAX_NUISANCE_COST = 20.0
-"""Half the sum of squares of some twelve bench errors, in standard deviations: no calibrated bench has more
-(docs/results/shape.md)."""
 
 _NAMES = {
     layout.X: ("its place", "mm", 1e3),

@@ -16,9 +16,10 @@ import numpy as np
 from experiments.shape_reconstruction.family.bent import BentBody
 from experiments.shape_reconstruction.family.kind import FamilyShape, Random, ShapeKind
 from experiments.shape_reconstruction.family.layout import CODE_SIZE, KIND
-from experiments.shape_reconstruction.family.revolution import SOLID, BodyOfRevolution
+from experiments.shape_reconstruction.family.revolution import BodyOfRevolution
 from experiments.shape_reconstruction.family.revolution_distance import HOLLOW
 from experiments.shape_reconstruction.family.tool import FlatTool
+from experiments.shape_reconstruction.thresholds import PART_RARITY, SIZE_SPREAD, SIZE_TAIL, SOLID_RARITY
 from harness.basics.arrays import FloatArray, IntArray
 
 KINDS: tuple[ShapeKind, ...] = (BodyOfRevolution(), FlatTool(), BentBody())
@@ -44,9 +45,6 @@ def draw_shape(name: str, random: Random) -> FamilyShape:
     return FamilyShape(name, code, theta)
 
 
-PART = 3.0
-"""Natural logarithm of the rarity of a part that no sample of a class has."""
-
 _UNNAMED = {"knob": 2.0, "vase": 2.0}
 """Rarity of classes that hold any round shape: what has a name of its own is seen more often."""
 
@@ -57,8 +55,8 @@ def rarity(shape: FamilyShape) -> float:
     """Compute the natural logarithm of how much rarer a combination of parts is than an ordinary one."""
     code = shape.code
     apart = (np.array(codes_of(shape.name)) != code).astype(np.float64)
-    apart[:, HOLLOW] *= SOLID / PART
-    price = PART * float(apart.sum(axis=1).min()) + _UNNAMED.get(shape.name, 0.0)
+    apart[:, HOLLOW] *= SOLID_RARITY / PART_RARITY
+    price = PART_RARITY * float(apart.sum(axis=1).min()) + _UNNAMED.get(shape.name, 0.0)
     return price + kind_of(code).rarity(code, shape.theta, not apart[:, HOLLOW].any())
 
 
@@ -73,22 +71,16 @@ def codes_of(name: str) -> tuple[tuple[int, ...], ...]:
 DRAWS = 200
 """Samples of each class whose sizes are compared."""
 
-OWN = 0.15
-"""Standard deviation of the logarithm of a size about the samples: they end at makers' lists."""
-
-TAIL = 4.0
-"""Degrees of freedom of sizes: the fewer, the less odd is one far from all samples."""
-
 
 def rarity_of_size(shape: FamilyShape) -> float:
     """Compute the natural logarithm of how much rarer the width and height of a shape are in its class.
 
     A sample is scaled to the readings and then fitted: a stemmed glass as low and wide as a bowl is no glass.
-    Student's density of two numbers, about those of the class (docs/results/shape.md).
+    Student's density of two numbers, about those of the class (tuned on 24 development runs).
     """
     middle, precision = _ordinary(shape.name)
     off = np.log(kind_of(shape.code).extent(shape.code, shape.theta)) - middle
-    return float(0.5 * (TAIL + 2.0) * np.log1p(off @ precision @ off / TAIL))
+    return float(0.5 * (SIZE_TAIL + 2.0) * np.log1p(off @ precision @ off / SIZE_TAIL))
 
 
 @lru_cache(maxsize=64)
@@ -98,5 +90,5 @@ def _ordinary(name: str) -> tuple[FloatArray, FloatArray]:
     shapes = [draw_shape(name, random) for _ in range(DRAWS)]
     kind = CLASSES[name]
     sizes = np.log([kind.extent(shape.code, shape.theta) for shape in shapes])
-    spread = np.cov(sizes.T) + OWN**2 * np.eye(2)
+    spread = np.cov(sizes.T) + SIZE_SPREAD**2 * np.eye(2)
     return np.asarray(sizes.mean(axis=0)), np.asarray(np.linalg.inv(spread))

@@ -8,11 +8,9 @@ from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.freedom import basis_of
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.kinds import KINDS
-from experiments.shape_reconstruction.family.search import TEMPERATURE, Hypothesis
+from experiments.shape_reconstruction.family.search import Hypothesis
+from experiments.shape_reconstruction.thresholds import MIN_WEIGHT, TEMPERATURE
 from harness.basics.arrays import FloatArray
-
-LEAST = 0.01
-"""Weight of a hypothesis, of the greatest, below which it is left out."""
 
 SAMPLES = 16
 """Shapes drawn about each hypothesis: fewer tell a press apart from others by chance."""
@@ -86,7 +84,7 @@ def mixture_of(found: list[Hypothesis], sighted: bool, touched: bool, seed: int)
         _, wide = np.linalg.slogdet(prior)
         scores[k] = -one.cost / TEMPERATURE - 0.5 * (narrow - wide)
     weights = np.exp(scores - scores.max())
-    order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] >= LEAST]
+    order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] >= MIN_WEIGHT]
     kept = weights[order] / weights[order].sum()
     random = np.random.default_rng(seed)
     about = tuple(_drawn(modes[i], sighted, touched, random) for i in order)

@@ -23,13 +23,8 @@ from experiments.shape_reconstruction.family.revolution_distance import (
     SPOUT,
     SUPER,
 )
+from experiments.shape_reconstruction.thresholds import MIN_VESSEL_WIDTH, SOLID_RARITY
 from harness.basics.arrays import FloatArray, IntArray
-
-SOLID = 6.0
-"""Natural logarithm of the rarity of a solid vessel, a hollow solid body, and a widening one."""
-
-NARROW = 0.35
-"""Ratio of width to length of a vessel below which it is a trough: as rare as a solid one."""
 
 LOOPS, TURNS = 3, 8
 """Handles that are sampled where there is none, and yaws that each is tried at."""
@@ -337,12 +332,12 @@ class BodyOfRevolution(ShapeKind):
         # Vessels are widest at the top, and solid things are not.
         widens = radii[-1] > radii.max() - 0.1 and radii[-1] > radii[0] + 0.15
         if widens and code[HOLLOW] == 0 and agrees:
-            return SOLID
+            return SOLID_RARITY
         if code[PLAN] == CORED and code[HOLLOW] != 0:
             # No vessel with straight sides that is sampled is much longer than wide.
             sides = np.exp(theta[[SLOT.core_x, SLOT.core_y]]) + np.exp(radii.max())
-            if sides.min() < NARROW * sides.max():
-                return SOLID
+            if sides.min() < MIN_VESSEL_WIDTH * sides.max():
+                return SOLID_RARITY
         return 0.0
 
     def has_sides(self, code: IntArray) -> bool:

@@ -31,6 +31,7 @@ from experiments.shape_reconstruction.family.observed import FamilyEvidence, obs
 from experiments.shape_reconstruction.family.proposals import Guides, change, guides_of, perturb, place_sample
 from experiments.shape_reconstruction.family.residuals import prepared_room, rows_for
 from experiments.shape_reconstruction.family.settings import FamilySettings
+from experiments.shape_reconstruction.thresholds import SAME_SHAPE, TEMPERATURE
 from harness.basics.arrays import FloatArray
 
 PLACED = 0.6
@@ -38,9 +39,6 @@ PLACED = 0.6
 
 PLACING = ((1, 0.5), (1, 0.5), (2, 1.0))
 """Iterations in which samples find position, yaw and size; the fraction of each code that continues."""
-
-TEMPERATURE = 3.0
-"""Divisor of costs where they become weights: errors of neighbouring readings are correlated."""
 
 FIRST_ROUNDS, CHANGE_ROUNDS = 3, 5
 """Iterations after which the worst starts are dropped; iterations in which a changed shape is fitted."""
@@ -50,9 +48,6 @@ CHANGES = 2
 
 PERTURBED, PERTURBATIONS = 2, 8
 """Hypotheses that are perturbed, and perturbed shapes of each in a round."""
-
-SAME_SHAPE = 1.5e-3
-"""Largest difference of two shapes of one code that count as one hypothesis, m."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ import numpy as np
 from scipy import ndimage
 
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
+from experiments.shape_reconstruction.thresholds import MIN_PIXELS
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply, inverse
 
@@ -92,13 +93,9 @@ def shift_sigma(look: SeenMask, depth: float) -> float:
     return float(np.hypot(turned, look.focal_length * look.position_error / depth))
 
 
-LEAST = 12
-"""Pixels that an object must cover to be seen."""
-
-
 def silhouette_of(evidence: ShapeEvidence, contacts: FloatArray) -> Silhouette | None:
     """The silhouette, shifted so that ``(n, 3)`` m of contacts are within it; None where nothing was seen."""
     look = evidence.look
-    if look is None or int(look.mask.sum()) < LEAST or bool(look.mask.all()):
+    if look is None or int(look.mask.sum()) < MIN_PIXELS or bool(look.mask.all()):
         return None
     return Silhouette.of(look, contacts)

@@ -37,6 +37,7 @@ from experiments.shape_reconstruction.smooth.revolution import (
     turned_room,
 )
 from experiments.shape_reconstruction.smooth.thin_plate import SurfaceData, ThinPlateField, fitted
+from experiments.shape_reconstruction.thresholds import MAX_PREDICTION_SIGMAS
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
 
@@ -168,7 +169,7 @@ class LeftOut:
     """``(contacts,)`` rms distance of each from the field fitted without it, m; zero where thinning kept no
     point of it."""
     outliers: dict[int, float]
-    """distance by the index of the touch, m, of those more than ``DOUBTFUL`` standard deviations off."""
+    """distance of each outlier by the index of its touch, m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,9 +325,6 @@ def _border(silhouette: Silhouette) -> tuple[FloatArray, FloatArray]:
     return np.column_stack([columns + 0.5, rows + 0.5])[some], outward[some]
 
 
-DOUBTFUL = 4.0
-"""Standard deviations between a contact and its prediction above which it is an outlier."""
-
 _SAME_PLACE = 1e-12
 
 
@@ -352,6 +350,6 @@ def predict_by_field(evidence: ShapeEvidence, field: ThinPlateField) -> LeftOut:
         errors[number] = field.reach * float(np.sqrt(np.mean(off[values] ** 2)))
         mean = float(off[values].mean())
         sigma = float(np.sqrt(block[values, values].mean()))
-        if abs(mean) > DOUBTFUL * sigma:
+        if abs(mean) > MAX_PREDICTION_SIGMAS * sigma:
             found[contact.index] = abs(mean) * field.reach
     return LeftOut(errors, found)

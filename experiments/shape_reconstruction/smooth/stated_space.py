@@ -3,20 +3,10 @@
 import numpy as np
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.thresholds import MAX_CENTRE_OFFSET, MAX_LENGTH_RATIO, MAX_PLACE_SIGMAS
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.mesh import Mesh
-
-PLACE_ERRORS = 3.0
-"""Standard deviations of the stated place that the object's middle is off by, at most."""
-
-OFF_MIDDLE = 0.25
-"""Distance between an object's middle and what it stands on, relative to ``largest``, at most: a head heavier
-than its handle."""
-
-TOO_LONG = 1.1
-"""An answer's longest side over ``largest`` from which on the readings contradict it: the surface's own
-error."""
 
 _YAWS = 45
 _HORIZON = 1.0e-3
@@ -25,7 +15,7 @@ _FAR = 100.0
 
 def max_offset(evidence: ShapeEvidence) -> float:
     """Greatest distance between the stated place and the support under the object, m."""
-    return PLACE_ERRORS * evidence.place_error + OFF_MIDDLE * evidence.largest
+    return MAX_PLACE_SIGMAS * evidence.place_error + MAX_CENTRE_OFFSET * evidence.largest
 
 
 def require_stated_space(evidence: ShapeEvidence) -> None:
@@ -63,7 +53,7 @@ def require_stated_space(evidence: ShapeEvidence) -> None:
     if not evidence.contacts:
         return
     points = np.concatenate([touch.points for touch in evidence.contacts])
-    reach = evidence.largest / np.sqrt(2.0) + PLACE_ERRORS * evidence.place_error
+    reach = evidence.largest / np.sqrt(2.0) + MAX_PLACE_SIGMAS * evidence.place_error
     off = float(np.linalg.norm(points[:, :2], axis=1).max())
     longest = longest_side(points)
     if off > reach:
@@ -72,7 +62,7 @@ def require_stated_space(evidence: ShapeEvidence) -> None:
             f"{evidence.place_error * 1e3:g} mm and largest {evidence.largest:g} m the object ends within "
             f"{reach:.2f} m; correct object.pose.position or these two"
         )
-    if longest > TOO_LONG * evidence.largest:
+    if longest > MAX_LENGTH_RATIO * evidence.largest:
         raise FitRefused(
             f"contacts are {longest:.2f} m apart, and [shape] largest is {evidence.largest:g} m; raise "
             "largest, or check whether the presses met one object"
@@ -88,10 +78,10 @@ def require_stated_size(mesh: Mesh, evidence: ShapeEvidence, method: str) -> Non
         method: name of the estimator, for the message.
 
     Raises:
-        FitRefused: its longest side is more than ``TOO_LONG`` times ``largest``.
+        FitRefused: its longest side is more than ``MAX_LENGTH_RATIO`` times ``largest``.
     """
     longest = longest_side(mesh.vertices)
-    if longest > TOO_LONG * evidence.largest:
+    if longest > MAX_LENGTH_RATIO * evidence.largest:
         raise FitRefused(
             f"the readings fit a body {longest:.2f} m long (method {method}), and [shape] largest is "
             f"{evidence.largest:g} m; check the camera's pose and where the object stands, or raise largest"

@@ -6,18 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.shape_reconstruction.choice import (
-    ASSUMED_DEVIATION,
-    BLIND_CONTACTS,
-    FAMILY_ODDS,
-    MAX_BEYOND,
-    MAX_OUTLINE_ERROR,
-    MIN_CONTACTS,
-    choose,
-)
-from experiments.shape_reconstruction.family.freedom import MAX_NUISANCE_COST, NuisanceCost
+from experiments.shape_reconstruction.choice import choose
+from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.kinds import draw_shape
-from experiments.shape_reconstruction.fits import FOLDS, PREDICTION_SCALE, FamilyFit, SmoothFit, folds_of
+from experiments.shape_reconstruction.fits import FOLDS, FamilyFit, SmoothFit, folds_of
+from experiments.shape_reconstruction.thresholds import (
+    ASSUMED_DEVIATION,
+    MAX_BEYOND_CONTACTS,
+    MAX_NUISANCE_COST,
+    MAX_OUTLINE_ERROR,
+    MIN_BLIND_CONTACTS,
+    MIN_CONTACTS,
+    MIN_LOG_ODDS,
+    PREDICTION_SCALE,
+)
 from tests.support.family_shapes import family_fit, mixture_of
 
 DEVIATION = 1.0e-3
@@ -72,7 +74,7 @@ def test_the_smooth_surface_must_be_likelier_by_the_stated_odds() -> None:
     """One contact off by the scale alone costs log 2."""
     smooth = smooth_of(1, PREDICTION_SCALE)
     for by, name in ((0.99, "family"), (1.01, "smooth")):
-        error = PREDICTION_SCALE * np.sqrt(np.exp(np.log(2.0) + by * FAMILY_ODDS) - 1.0)
+        error = PREDICTION_SCALE * np.sqrt(np.exp(np.log(2.0) + by * MIN_LOG_ODDS) - 1.0)
         assert choose(fit_of(1, error), smooth, None).estimator == name
 
 
@@ -82,16 +84,16 @@ def test_the_smooth_surface_must_be_likelier_by_the_stated_odds() -> None:
         ({"outline_error": 1.1 * MAX_OUTLINE_ERROR}, "misses or adds 6 % of the outline"),
         ({"outline_error": 0.9 * MAX_OUTLINE_ERROR}, None),
         ({"nuisance": EXCESSIVE}, "on a bench as this is calibrated"),
-        ({"sighted": False, "beyond_contacts": 1.1 * MAX_BEYOND}, "11 mm beyond 12 contacts"),
-        ({"sighted": False, "beyond_contacts": 0.9 * MAX_BEYOND}, None),
-        ({"sighted": True, "beyond_contacts": 1.1 * MAX_BEYOND}, None),  # the picture shows that it is there
+        ({"sighted": False, "beyond_contacts": 1.1 * MAX_BEYOND_CONTACTS}, "11 mm beyond 12 contacts"),
+        ({"sighted": False, "beyond_contacts": 0.9 * MAX_BEYOND_CONTACTS}, None),
+        ({"sighted": True, "beyond_contacts": 1.1 * MAX_BEYOND_CONTACTS}, None),  # the picture shows it
     ],
 )
 def test_a_family_that_contradicts_the_readings_is_rejected_with_the_reason(
     changes: dict[str, Any], reason: str | None
 ) -> None:
-    fit = fit_of(BLIND_CONTACTS, **changes)
-    found = choose(fit, smooth_of(BLIND_CONTACTS, 20e-3), PRIOR)
+    fit = fit_of(MIN_BLIND_CONTACTS, **changes)
+    found = choose(fit, smooth_of(MIN_BLIND_CONTACTS, 20e-3), PRIOR)
     assert found.estimator == ("family" if reason is None else "smooth")
     if reason is not None:
         assert reason in found.flags[-1]
@@ -101,8 +103,8 @@ def test_a_family_that_contradicts_the_readings_is_rejected_with_the_reason(
 
 
 def test_a_shape_beyond_few_contacts_without_a_picture_may_be_there() -> None:
-    few = BLIND_CONTACTS - 1
-    fit = fit_of(few, sighted=False, beyond_contacts=1.1 * MAX_BEYOND)
+    few = MIN_BLIND_CONTACTS - 1
+    fit = fit_of(few, sighted=False, beyond_contacts=1.1 * MAX_BEYOND_CONTACTS)
     assert choose(fit, smooth_of(few, 20e-3), None).estimator == "family"
 
 

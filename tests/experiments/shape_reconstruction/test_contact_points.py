@@ -3,13 +3,8 @@
 import numpy as np
 import pytest
 
-from experiments.shape_reconstruction.contact_points import (
-    CLEAR,
-    POINTS,
-    TOUCHED,
-    ContactPoints,
-    contact_points,
-)
+from experiments.shape_reconstruction.contact_points import CLEAR, POINTS, ContactPoints, contact_points
+from experiments.shape_reconstruction.thresholds import MIN_INDENTATION
 from harness.basics.arrays import FloatArray
 
 PITCH = 0.1245e-3
@@ -65,7 +60,7 @@ def test_points_are_spread_over_all_that_was_touched() -> None:
 
 
 def test_what_was_hardly_touched_is_no_contact() -> None:
-    heights = np.full((ROWS, COLUMNS), 0.99 * TOUCHED)
+    heights = np.full((ROWS, COLUMNS), 0.99 * MIN_INDENTATION)
     assert contact_points(heights, np.zeros_like(heights), PITCH) is None
     assert contact_points(np.zeros_like(heights), np.zeros_like(heights), PITCH) is None
 
@@ -89,7 +84,7 @@ def test_clear_places_are_on_the_face_where_nothing_was_touched_and_spread_over_
     assert np.ptp(clear[:, 0]) > 19e-3
     assert np.ptp(clear[:, 1]) > 14e-3
     # Deep enough to be of the object, or not: gel that hangs from it is neither.
-    hanging = np.where(np.abs(x) < 2e-3, 1e-3, np.where(np.abs(x) < 6e-3, 2.0 * TOUCHED, 0.0))
+    hanging = np.where(np.abs(x) < 2e-3, 1e-3, np.where(np.abs(x) < 6e-3, 2.0 * MIN_INDENTATION, 0.0))
     assert np.all(np.abs(read(hanging).clear[:, 0]) >= 6e-3)
 
 

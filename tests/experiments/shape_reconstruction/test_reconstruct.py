@@ -7,23 +7,25 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction import reconstruct as reconstruction
-from experiments.shape_reconstruction.choice import MAX_OUTLINE_ERROR, MIN_CONTACTS
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.estimate import LOOSE, RIVAL
-from experiments.shape_reconstruction.family.freedom import MAX_NUISANCE_COST, NuisanceCost
+from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.kinds import draw_shape
 from experiments.shape_reconstruction.family.search import Hypothesis
 from experiments.shape_reconstruction.family.settings import CONTINUED, FamilySettings
 from experiments.shape_reconstruction.fits import FamilyFit, SmoothFit
 from experiments.shape_reconstruction.prior.network import shipped, with_supposed
-from experiments.shape_reconstruction.reconstruct import (
-    SEARCHES,
-    UNEASY,
-    reconstruct,
-    reconstruct_with_prior,
-)
+from experiments.shape_reconstruction.reconstruct import reconstruct, reconstruct_with_prior
 from experiments.shape_reconstruction.smooth.hermite import by_hermite
 from experiments.shape_reconstruction.surface import ShapeEstimate
+from experiments.shape_reconstruction.thresholds import (
+    MAX_NUISANCE_COST,
+    MAX_NUISANCE_OF_FEW,
+    MAX_OUTLINE_ERROR,
+    MAX_SEARCHES,
+    MIN_CONTACTS,
+    MIN_RIVAL_WEIGHT,
+    POOR_CONTACT_COST,
+)
 from harness.basics.errors import FitRefused, OutOfDomain
 from harness.objects.builtin import build
 from tests.support.family_shapes import family_fit, mixture_of
@@ -42,13 +44,13 @@ SHAPES = tuple(draw_shape(name, np.random.default_rng(0)) for name in ("mug", "c
 
 
 def fit_of(residual: float = 0.1, nuisance: float = 0.0, rival: float = 0.0, cost: float = 1.0) -> FamilyFit:
-    """A fit whose contacts are off by so many times ``LOOSE``."""
+    """A fit whose contacts are off by so many times ``POOR_CONTACT_COST``."""
     return family_fit(
         mixture_of(*SHAPES, weights=(1.0 - rival, rival), cost=cost),
         mesh=SMOOTH.mesh,
         deviation=SMOOTH.deviation,
         known_by=SMOOTH.known_by,
-        contact_cost=residual * LOOSE,
+        contact_cost=residual * POOR_CONTACT_COST,
         nuisance=NuisanceCost(nuisance, ""),
     )
 
@@ -89,15 +91,15 @@ GOOD, POOR = fit_of(), fit_of(residual=2.0)
         (8, True, [GOOD], 1, 0),
         (8, False, [GOOD], 2, 0),  # without a picture the cost has more local minima
         (5, False, [GOOD], 1, 0),
-        (8, True, [POOR], SEARCHES, 0),  # of equals the first
+        (8, True, [POOR], MAX_SEARCHES, 0),  # of equals the first
         (8, True, [POOR, GOOD], 2, 1),
-        (8, True, [POOR, fit_of(residual=1.5, cost=9.0), POOR], SEARCHES, 1),
+        (8, True, [POOR, fit_of(residual=1.5, cost=9.0), POOR], MAX_SEARCHES, 1),
         (1, True, [POOR, GOOD], 2, 1),
         (8, True, [fit_of(nuisance=1.1 * MAX_NUISANCE_COST), GOOD], 2, 1),
-        (8, True, [fit_of(rival=1.1 * RIVAL), fit_of(cost=0.5)], 2, 1),
-        (5, True, [fit_of(rival=1.1 * RIVAL)], 1, 0),
-        (5, True, [fit_of(nuisance=1.1 * UNEASY), fit_of(cost=0.5)], 2, 1),
-        (8, True, [fit_of(nuisance=1.1 * UNEASY)], 1, 0),
+        (8, True, [fit_of(rival=1.1 * MIN_RIVAL_WEIGHT), fit_of(cost=0.5)], 2, 1),
+        (5, True, [fit_of(rival=1.1 * MIN_RIVAL_WEIGHT)], 1, 0),
+        (5, True, [fit_of(nuisance=1.1 * MAX_NUISANCE_OF_FEW), fit_of(cost=0.5)], 2, 1),
+        (8, True, [fit_of(nuisance=1.1 * MAX_NUISANCE_OF_FEW)], 1, 0),
     ],
 )
 def test_a_poor_or_undecided_fit_is_searched_again_and_the_best_is_kept(
@@ -119,7 +121,7 @@ def test_a_fit_beside_the_outline_is_searched_again(monkeypatch: pytest.MonkeyPa
     family = Family(monkeypatch, GOOD)
     family.outline = 1.1 * MAX_OUTLINE_ERROR
     answer = reconstruct(part(8))
-    assert len(family.seeds) == SEARCHES
+    assert len(family.seeds) == MAX_SEARCHES
     assert "of the outline" in answer.flags[-1]
     assert isinstance(answer, SmoothFit)
     assert answer.rejected is not None  # the next press begins at its hypotheses

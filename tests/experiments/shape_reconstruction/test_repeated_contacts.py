@@ -8,11 +8,11 @@ import pytest
 
 from experiments.paper.shape_baselines import by_hull
 from experiments.paper.shape_retrieval import by_retrieval, household_library
-from experiments.shape_reconstruction.choice import ASSUMED_DEVIATION
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
 from experiments.shape_reconstruction.methods import Method, estimated
 from experiments.shape_reconstruction.smooth.hermite import by_hermite
 from experiments.shape_reconstruction.surface import TOUCHED
+from experiments.shape_reconstruction.thresholds import ASSUMED_DEVIATION
 from harness.basics.geometry import rotation_about, transform, translation
 from harness.bench.bench_errors import USUAL
 from harness.objects.builtin import build

@@ -11,20 +11,19 @@ import trimesh
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.contact_fit import ContactFit, displacement
-from experiments.shape_reconstruction.family.estimate import (
-    BLIND,
-    LOOSE,
-    NOISE,
-    _flags,
-    _outliers,
-    fit_family,
-)
-from experiments.shape_reconstruction.family.freedom import MAX_NUISANCE_COST, NuisanceCost
+from experiments.shape_reconstruction.family.estimate import _flags, _outliers, fit_family
+from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.fits import FamilyFit
 from experiments.shape_reconstruction.metric import shape_error
 from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
+from experiments.shape_reconstruction.thresholds import (
+    BLIND_FACTOR,
+    MAX_NUISANCE_COST,
+    MIN_DEVIATION,
+    POOR_CONTACT_COST,
+)
 from harness.basics.errors import OutOfDomain
 from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
@@ -89,7 +88,7 @@ def test_a_can_that_leans_says_so(estimate: FamilyFit, can: Mesh, monkeypatch: p
     found = fit_family(shape_readings(touches_on(mesh, 16, seed=2), look_at(mesh)), COARSE)
     assert found.not_bounded == ("y",), "no class limits what no reading does"
     assert found.nuisance.cost > MAX_NUISANCE_COST > 2.0 * estimate.nuisance.cost
-    assert found.contact_cost < LOOSE
+    assert found.contact_cost < POOR_CONTACT_COST
     (said,) = [flag for flag in found.flags if "standard deviations" in flag]
     assert said.startswith("outside the family: such a shape fits with its upright off by")
     assert not [flag for flag in estimate.flags if "standard deviations" in flag]
@@ -142,7 +141,7 @@ def test_what_the_object_stands_on_is_less_sure_than_its_side(estimate: FamilyFi
 
 def test_without_a_picture_no_place_is_as_sure_as_with_one(readings: ShapeEvidence) -> None:
     touched = fit_family(replace(readings, look=None), COARSE)
-    assert touched.deviation.min() > BLIND * NOISE
+    assert touched.deviation.min() > BLIND_FACTOR * MIN_DEVIATION
 
 
 def test_a_blank_picture_is_no_reading(readings: ShapeEvidence) -> None:
@@ -170,7 +169,7 @@ def test_a_body_of_no_class_is_said_to_be_outside(monkeypatch: pytest.MonkeyPatc
     found = fit_family(shape_readings(touches_on(mesh, 14, seed=0), look_at(mesh)), COARSE)
     require_sound(found)
     assert any("outside the family" in flag for flag in found.flags)
-    assert found.contact_cost > LOOSE
+    assert found.contact_cost > POOR_CONTACT_COST
     assert found.not_bounded == ("y",), "no class limits what no reading does"
 
 

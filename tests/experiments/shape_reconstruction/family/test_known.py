@@ -7,7 +7,8 @@ import pytest
 import trimesh
 
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
-from experiments.shape_reconstruction.family.estimate import SHORT, beyond_contacts, not_bounded
+from experiments.shape_reconstruction.family.estimate import beyond_contacts, not_bounded
+from experiments.shape_reconstruction.thresholds import MAX_BEYOND_LAST
 from harness.basics.mesh import Mesh
 from tests.support.shape_readings import look_at, shape_readings, touch_at
 
@@ -31,13 +32,11 @@ def touched(facing: str, look: SeenMask | None = None) -> ShapeEvidence:
     return shape_readings(tuple(touches), look)
 
 
-@pytest.mark.parametrize(
-    ("longer", "expected"), [(0.0, ()), (0.6 * SHORT, ()), (1.4 * SHORT, ("x",)), (8.0 * SHORT, ("x",))]
-)
+@pytest.mark.parametrize(("longer", "expected"), [(0.0, ()), (0.6, ()), (1.4, ("x",)), (8.0, ("x",))])
 def test_an_answer_far_beyond_its_contacts_is_not_bounded_there(longer: float, expected: tuple[str]) -> None:
-    evidence = touched("+x -x +y -y +z")
-    assert not_bounded(evidence, box(longer), outside=False) == expected
-    assert beyond_contacts(box(longer).vertices, evidence)[:, 0].max() == pytest.approx(longer, abs=1e-9)
+    evidence, by = touched("+x -x +y -y +z"), longer * MAX_BEYOND_LAST
+    assert not_bounded(evidence, box(by), outside=False) == expected
+    assert beyond_contacts(box(by).vertices, evidence)[:, 0].max() == pytest.approx(by, abs=1e-9)
 
 
 def test_a_side_that_nothing_looks_towards_is_not_bounded() -> None:

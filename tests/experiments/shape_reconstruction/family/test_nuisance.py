@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.freedom import MAX_NUISANCE_COST, bench_rows, nuisance_cost
+from experiments.shape_reconstruction.family.freedom import bench_rows, nuisance_cost
+from experiments.shape_reconstruction.thresholds import MAX_NUISANCE_COST
 
 SUPPORT = 1.0e-3
 ROWS = bench_rows(place=0.02, support=SUPPORT, pixel=1.0e-3, shift=2.0e-3, scale=0.01)

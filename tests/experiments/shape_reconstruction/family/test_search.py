@@ -18,9 +18,9 @@ from experiments.shape_reconstruction.family.observed import PASS, FamilyEvidenc
 from experiments.shape_reconstruction.family.posterior import mixture_of
 from experiments.shape_reconstruction.family.proposals import guides_of, place_sample
 from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
-from experiments.shape_reconstruction.family.revolution import SOLID
 from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
+from experiments.shape_reconstruction.thresholds import SOLID_RARITY
 from harness.basics.geometry import apply, transform, translation
 from tests.support.family_readings import made, nudged
 from tests.support.family_shapes import SHAPES
@@ -220,7 +220,7 @@ def test_a_vessel_much_longer_than_wide_is_rare() -> None:
     tray = draw_shape("tray", np.random.default_rng(0))
     ordinary = rarity(tray)
     tray.theta[[revolution.SLOT.core_x, revolution.SLOT.core_y]] = np.log([0.2, 0.001])
-    assert rarity(tray) == pytest.approx(ordinary + SOLID)
+    assert rarity(tray) == pytest.approx(ordinary + SOLID_RARITY)
     solid = draw_shape("packet", np.random.default_rng(0))
     before = rarity(solid)
     solid.theta[[revolution.SLOT.core_x, revolution.SLOT.core_y]] = np.log([0.2, 0.001])

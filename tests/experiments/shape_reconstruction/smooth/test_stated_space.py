@@ -12,7 +12,8 @@ from experiments.shape_reconstruction.family import estimate as family
 from experiments.shape_reconstruction.family.settings import CONTINUED
 from experiments.shape_reconstruction.methods import METHODS, continued, estimated
 from experiments.shape_reconstruction.smooth.hermite import by_hermite
-from experiments.shape_reconstruction.smooth.stated_space import TOO_LONG, longest_side, max_offset
+from experiments.shape_reconstruction.smooth.stated_space import longest_side, max_offset
+from experiments.shape_reconstruction.thresholds import MAX_LENGTH_RATIO
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import translation
@@ -82,7 +83,7 @@ def test_an_answer_longer_than_stated_is_refused(
     monkeypatch: pytest.MonkeyPatch, factor: float, refused: bool
 ) -> None:
     small = by_hermite(TOUCHED)
-    size = factor * TOO_LONG * TOUCHED.largest / longest_side(small.mesh.vertices)
+    size = factor * MAX_LENGTH_RATIO * TOUCHED.largest / longest_side(small.mesh.vertices)
     grown = replace(small, mesh=Mesh(size * small.mesh.vertices, small.mesh.faces))
     box = {"box": lambda _: grown}
     monkeypatch.setattr(methods, "reconstruct", lambda *_: grown)
