@@ -8,21 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.fits import FamilyFit, SmoothFit
 from experiments.shape_reconstruction.surface import TOUCHED, ShapeEstimate
-from experiments.shape_reconstruction.thresholds import (
-    ASSUMED_DEVIATION,
-    MAX_BEYOND_CONTACTS,
-    MAX_NUISANCE_OF_FEW,
-    MAX_OUTLINE_ERROR,
-    MAX_SEARCHES,
-    MIN_BLIND_CONTACTS,
-    MIN_BLIND_SEARCHES,
-    MIN_CONTACTS,
-    MIN_LOG_ODDS,
-    MIN_RIVAL_WEIGHT,
-    POOR_CONTACT_COST,
-)
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 
@@ -49,14 +37,14 @@ def choose(fit: FamilyFit | None, smooth: SmoothFit | None, prior: ShapeEstimate
     if reason is not None and smooth is not None:
         return _as_smooth(smooth, fit.flags, reason)
     count = len(fit.left_out)
-    if count >= MIN_CONTACTS and reason is None:
+    if count >= limits.MIN_CONTACTS and reason is None:
         return replace(fit, deviation=_at_least(fit, fit.prediction_error))
     few = {0: "the picture alone", 1: "1 contact"}.get(count, f"{count} contacts")
     verb = "is" if count < 2 else "are"
-    untested = f"{MIN_CONTACTS} contacts are needed to test this, and there {verb} {few}"
+    untested = f"{limits.MIN_CONTACTS} contacts are needed to test this, and there {verb} {few}"
     return replace(
         fit,
-        deviation=np.hypot(fit.deviation, np.where(fit.known_by == TOUCHED, 0.0, ASSUMED_DEVIATION)),
+        deviation=np.hypot(fit.deviation, np.where(fit.known_by == TOUCHED, 0.0, limits.ASSUMED_DEVIATION)),
         not_bounded=tuple(axis for axis in "xyz" if axis in {*fit.not_bounded, *fit.open_axes}),
         flags=(*fit.flags, reason or f"assuming a household shape: {untested}"),
     )
@@ -72,16 +60,20 @@ def rejection_reason(fit: FamilyFit, smooth: SmoothFit | None) -> str | None:
     count = len(fit.left_out)
     if fit.nuisance.is_excessive:
         return "no household shape fits the readings on a bench as this is calibrated"
-    if fit.outline_error > MAX_OUTLINE_ERROR:
+    if fit.outline_error > limits.MAX_OUTLINE_ERROR:
         return (
             f"the best household shape misses or adds {100.0 * fit.outline_error:.0f} % of the outline in "
-            f"the picture, and at most {100.0 * MAX_OUTLINE_ERROR:.0f} % are the camera's error"
+            f"the picture, and at most {100.0 * limits.MAX_OUTLINE_ERROR:.0f} % are the camera's error"
         )
-    if not fit.sighted and fit.beyond_contacts > MAX_BEYOND_CONTACTS and count >= MIN_BLIND_CONTACTS:
+    if (
+        not fit.sighted
+        and fit.beyond_contacts > limits.MAX_BEYOND_CONTACTS
+        and count >= limits.MIN_BLIND_CONTACTS
+    ):
         return (
             f"the household shape lies {fit.beyond_contacts * 1e3:.0f} mm beyond {count} contacts on average"
         )
-    if smooth is not None and fit.misfit > smooth.misfit + MIN_LOG_ODDS:
+    if smooth is not None and fit.misfit > smooth.misfit + limits.MIN_LOG_ODDS:
         return (
             f"contacts left out are {fit.prediction_error * 1e3:.1f} mm off the household shape and "
             f"{smooth.prediction_error * 1e3:.1f} mm off the smooth surface"
@@ -106,8 +98,8 @@ def _at_least(found: ShapeEstimate, error: float) -> FloatArray:
 
 def is_poor(fit: FamilyFit) -> bool:
     """True where the shape fits contacts or outline poorly, or needs excessive bench errors."""
-    poor_contacts = fit.contact_cost > POOR_CONTACT_COST
-    return poor_contacts or fit.nuisance.is_excessive or fit.outline_error > MAX_OUTLINE_ERROR
+    poor_contacts = fit.contact_cost > limits.POOR_CONTACT_COST
+    return poor_contacts or fit.nuisance.is_excessive or fit.outline_error > limits.MAX_OUTLINE_ERROR
 
 
 def rank(fit: FamilyFit) -> tuple[bool, float]:
@@ -125,8 +117,8 @@ def needs_search(best: FamilyFit, made: int) -> bool:
         best: the best fit so far.
         made: searches so far.
     """
-    many = len(best.left_out) >= MIN_CONTACTS
-    least = 1 if best.sighted or not many else MIN_BLIND_SEARCHES
-    rivals = sum(weight >= MIN_RIVAL_WEIGHT for weight in best.mixture.by_class().values())
-    unsure = rivals > 1 if many else best.nuisance.cost > MAX_NUISANCE_OF_FEW
-    return made < MAX_SEARCHES and (made < least or is_poor(best) or (made == least and unsure))
+    many = len(best.left_out) >= limits.MIN_CONTACTS
+    least = 1 if best.sighted or not many else limits.MIN_BLIND_SEARCHES
+    rivals = sum(weight >= limits.MIN_RIVAL_WEIGHT for weight in best.mixture.by_class().values())
+    unsure = rivals > 1 if many else best.nuisance.cost > limits.MAX_NUISANCE_OF_FEW
+    return made < limits.MAX_SEARCHES and (made < least or is_poor(best) or (made == least and unsure))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_erosion, gaussian_filter
 
-from experiments.shape_reconstruction.thresholds import CONTACT_DEPTH, MIN_INDENTATION
+from experiments.shape_reconstruction import thresholds as limits
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 
 POINTS = 40
@@ -41,9 +41,9 @@ def contact_points(heights: FloatArray, errors: FloatArray, pitch: float) -> Con
         pitch: m of gel that a pixel shows.
     """
     deepest = float(heights.max())
-    if not deepest > MIN_INDENTATION:
+    if not deepest > limits.MIN_INDENTATION:
         return None
-    core = heights >= CONTACT_DEPTH * deepest
+    core = heights >= limits.CONTACT_DEPTH * deepest
     rows, columns = _spread(core, POINTS)
     points = _on_face(heights.shape, rows, columns, pitch)
     points[:, 2] = -heights[rows, columns]
@@ -56,7 +56,7 @@ def contact_points(heights: FloatArray, errors: FloatArray, pitch: float) -> Con
     )
     normals = np.column_stack([-slopes, -np.ones(len(slopes))])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    clear = _on_face(heights.shape, *_spread(heights < MIN_INDENTATION, CLEAR), pitch)
+    clear = _on_face(heights.shape, *_spread(heights < limits.MIN_INDENTATION, CLEAR), pitch)
     return ContactPoints(points, normals, float(np.median(errors[rows, columns])), clear)
 
 

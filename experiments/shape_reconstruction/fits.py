@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.surface import ShapeEstimate
-from experiments.shape_reconstruction.thresholds import PREDICTION_SCALE
 from harness.basics.arrays import FloatArray
 
 FOLDS = 8
@@ -26,7 +26,7 @@ class FittedShape(ShapeEstimate):
     @property
     def misfit(self) -> float:
         """Negative log-likelihood of the left-out contacts, less a constant."""
-        return float(np.log1p((self.left_out / PREDICTION_SCALE) ** 2).sum())
+        return float(np.log1p((self.left_out / limits.PREDICTION_SCALE) ** 2).sum())
 
     @property
     def prediction_error(self) -> float:

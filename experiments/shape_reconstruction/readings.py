@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.contact_points import contact_points
 from experiments.shape_reconstruction.evidence import GuardedTouch, SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.section import ShapeRun
-from experiments.shape_reconstruction.thresholds import MIN_EARLY_END, MIN_PIXELS
 from harness.basics.arrays import ByteArray, FloatArray, read_only
 from harness.basics.errors import PictureRefused
 from harness.basics.geometry import apply, translation
@@ -106,7 +106,7 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
         normal_sigma=settings.contact_tilt_error,
         index=record.step.index,
         clear=read_only(nothing if found is None else apply(stand_from_gel, found.clear)),
-        stopped=way < longest - MIN_EARLY_END,
+        stopped=way < longest - limits.MIN_EARLY_END,
     )
 
 
@@ -124,7 +124,7 @@ def seen_mask(run: RunFiles, live: ByteArray, bare: ByteArray) -> SeenMask | Non
     camera, settings = run.station.camera, run.scene.section(ShapeRun)
     assert camera is not None  # there are its pictures
     mask = mask_by_background(live, bare)
-    if mask.sum() < MIN_PIXELS:
+    if mask.sum() < limits.MIN_PIXELS:
         return None
     stand_from_camera = camera.base_from_camera.matrix.copy()
     stand_from_camera[:3, 3] -= base_from_stand(run)[:3, 3]

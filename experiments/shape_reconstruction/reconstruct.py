@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import ndimage
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.choice import (
     choose,
     is_poor,
@@ -27,11 +28,6 @@ from experiments.shape_reconstruction.smooth.bent_prior import bend_prior
 from experiments.shape_reconstruction.smooth.free_space import shift_sigma
 from experiments.shape_reconstruction.smooth.hermite import by_hermite
 from experiments.shape_reconstruction.surface import ShapeEstimate
-from experiments.shape_reconstruction.thresholds import (
-    MAX_OUTLINE_ERROR,
-    MIN_CONTACTS,
-    OUTSIDE_CONTACT_COST,
-)
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, OutOfDomain
 from harness.basics.faces.ray_mesh import RayMesh
@@ -71,7 +67,7 @@ def reconstruct(
         OutOfDomain: nothing was touched or seen.
     """
     settings = settings or FamilySettings()
-    evidence = evidence if len(evidence.contacts) >= MIN_CONTACTS else with_supposed(evidence)
+    evidence = evidence if len(evidence.contacts) >= limits.MIN_CONTACTS else with_supposed(evidence)
     smooth = _smooth(evidence)
     try:
         fit = (
@@ -104,12 +100,12 @@ def _smooth(evidence: ShapeEvidence) -> SmoothFit | None:
         # The prior may not apply: its window is too small, or free space leaves nothing of it.
         with suppress(FitRefused, OutOfDomain):
             found.append(bend_prior(evidence))
-    if not found or len(evidence.contacts) >= MIN_CONTACTS:
+    if not found or len(evidence.contacts) >= limits.MIN_CONTACTS:
         with suppress(OutOfDomain):  # contacts and free space may contradict each other
             found.append(by_hermite(evidence, symmetric=False))  # the family has all classes of round bodies
     shown = [replace(one, outline_error=outline_error(one.mesh, evidence.look)) for one in found]
     best = min((one.outline_error for one in shown), default=0.0)
-    alike = [one for one in shown if one.outline_error <= best + MAX_OUTLINE_ERROR]
+    alike = [one for one in shown if one.outline_error <= best + limits.MAX_OUTLINE_ERROR]
     return min(alike, key=lambda one: one.misfit, default=None)
 
 
@@ -185,7 +181,7 @@ def predict_left_out(fit: FamilyFit, evidence: ShapeEvidence) -> FloatArray:
         fits = [search.refine(one, ROUNDS, last=True) for one in begun]
         shape = min(fits, key=lambda one: one.cost).shape
         bent_to = moved_points(shape, kept, np.ones(len(kept.contacts), bool))
-        is_outside = contact_fit(shape, search.full).typical > OUTSIDE_CONTACT_COST
+        is_outside = contact_fit(shape, search.full).typical > limits.OUTSIDE_CONTACT_COST
         far = float(np.sqrt(np.mean(np.sum(bent_to[1] ** 2, axis=1)))) if is_outside else 0.0
         for k in fold:
             which = np.array([one is contacts[k] for one in contacts])

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
@@ -17,7 +18,6 @@ from experiments.shape_reconstruction.family.rays import first_met
 from experiments.shape_reconstruction.fits import FamilyFit
 from experiments.shape_reconstruction.section import Choice
 from experiments.shape_reconstruction.surface import ShapeEstimate
-from experiments.shape_reconstruction.thresholds import MIN_EXPECTED_ERROR
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import frame_facing, rotation_about, transform
@@ -120,7 +120,7 @@ def error_spared(evidence: ShapeEvidence, estimate: ShapeEstimate, lines: FloatA
         shares += [float(weight) / len(every)] * len(every)
     weights, apart = np.array(shares), distances_apart(shapes)
     now = bayes_risk(weights, apart)
-    if now < MIN_EXPECTED_ERROR:
+    if now < limits.MIN_EXPECTED_ERROR:
         return None
     face = evidence.housing, evidence.gel_thickness
     read = readings_on(shapes, lines, max(BEFORE, 0.5 * evidence.largest), face)

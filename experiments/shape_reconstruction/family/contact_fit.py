@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial.distance import cdist
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.contact_rows import SLIPPED, contact_sums
@@ -18,16 +19,6 @@ from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, farthest_points
 from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
-from experiments.shape_reconstruction.thresholds import (
-    MAX_NORMAL_SPREAD,
-    MIN_OUTLIER_COST,
-    MIN_OUTLIER_DISTANCE,
-    MIN_OUTLIER_RATIO,
-    MIN_PATCH_WIDTH,
-    MIN_TILT,
-    MIN_TILT_GAIN,
-    MIN_TILT_RATIO,
-)
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.geometry import rotation_from_vector
 
@@ -60,8 +51,8 @@ def contact_fit(shape: FamilyShape, seen: FamilyEvidence) -> ContactFit:
     if count:
         squares = (out.values[: len(seen.points)] * seen.sigma[seen.touch]) ** 2
         off = np.sqrt(np.bincount(seen.touch, squares, count) / np.bincount(seen.touch, minlength=count))
-    strange = (sums > MIN_OUTLIER_COST) & (off > MIN_OUTLIER_DISTANCE)
-    doubtful = strange & (sums > MIN_OUTLIER_RATIO * np.median(sums)) if count else strange
+    strange = (sums > limits.MIN_OUTLIER_COST) & (off > limits.MIN_OUTLIER_DISTANCE)
+    doubtful = strange & (sums > limits.MIN_OUTLIER_RATIO * np.median(sums)) if count else strange
     linear = np.sqrt(SLIPPED * sums) - 0.5 * SLIPPED
     by_contacts = float(np.where(sums <= SLIPPED, 0.5 * sums, linear).sum())
     return ContactFit(sums, off, doubtful, cost - by_contacts)
@@ -132,7 +123,11 @@ def turned_contacts(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
         middle = touch.points.mean(axis=0)
         widths = np.linalg.svd(touch.points - middle, compute_uv=False) / np.sqrt(len(touch.points))
         spread = np.arccos(np.clip(touch.normals @ touch.mean_normal, -1.0, 1.0))
-        if len(widths) > 1 and widths[1] > MIN_PATCH_WIDTH and spread.mean() < MAX_NORMAL_SPREAD:
+        if (
+            len(widths) > 1
+            and widths[1] > limits.MIN_PATCH_WIDTH
+            and spread.mean() < limits.MAX_NORMAL_SPREAD
+        ):
             judged.append(k)
     if not judged:
         return found
@@ -142,8 +137,8 @@ def turned_contacts(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
         _, shifted = _least(shape, patch, 3)
         moved, turned = _least(shape, patch, 5)
         tilts[row], gains[row] = np.linalg.norm(moved[3:]), shifted - turned
-    least = max(MIN_TILT, MIN_TILT_RATIO * float(np.median(tilts)))
-    found[judged] = np.where((tilts > least) & (gains > MIN_TILT_GAIN), tilts, 0.0)
+    least = max(limits.MIN_TILT, limits.MIN_TILT_RATIO * float(np.median(tilts)))
+    found[judged] = np.where((tilts > least) & (gains > limits.MIN_TILT_GAIN), tilts, 0.0)
     return found
 
 

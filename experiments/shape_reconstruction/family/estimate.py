@@ -8,6 +8,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.contact_fit import (
@@ -31,25 +32,6 @@ from experiments.shape_reconstruction.smooth.knowledge import beyond_deviation, 
 from experiments.shape_reconstruction.smooth.knowledge import not_bounded as open_axes
 from experiments.shape_reconstruction.smooth.stated_space import longest_side, max_offset
 from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED
-from experiments.shape_reconstruction.thresholds import (
-    BLIND_FACTOR,
-    BORDER_DISTANCE,
-    FAMILY_TOUCH_DISTANCE,
-    MAX_BEYOND_LAST,
-    MAX_HIDDEN_BORDER,
-    MAX_LENGTH_RATIO,
-    MAX_OUTLIER_FRACTION,
-    MIN_DEVIATION,
-    MIN_LIMITING_NORMAL,
-    MIN_RIVAL_WEIGHT,
-    MISFIT_GAIN,
-    OUTSIDE_CONTACT_COST,
-    POOR_CONTACT_COST,
-    SPREAD_FACTOR,
-    UNDERSIDE_DEVIATION,
-    UNDERSIDE_HEIGHT,
-    UNDERSIDE_NORMAL,
-)
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.errors import FitRefused, OutOfDomain
 from harness.basics.geometry import apply, inverse
@@ -103,7 +85,9 @@ def fit_family(
         mesh=mesh,
         deviation=_deviation(plain, mixture, mesh, fit, evidence.sighted),
         known_by=known_by(mesh.vertices, evidence),
-        not_bounded=not_bounded(evidence, mesh, fit.typical > POOR_CONTACT_COST or nuisance.is_excessive),
+        not_bounded=not_bounded(
+            evidence, mesh, fit.typical > limits.POOR_CONTACT_COST or nuisance.is_excessive
+        ),
         doubtful={
             touch.index: float(off)
             for touch, off, bad in zip(evidence.contacts, fit.off, rejected, strict=True)
@@ -129,7 +113,7 @@ def _at_stated_place(hypotheses: list[Hypothesis], evidence: ShapeEvidence) -> l
     Raises:
         FitRefused: there is none.
     """
-    limit = MAX_LENGTH_RATIO * evidence.largest
+    limit = limits.MAX_LENGTH_RATIO * evidence.largest
     kept = [
         one
         for one in hypotheses
@@ -162,7 +146,11 @@ def _by_picture_alone(found: FamilyFit, evidence: ShapeEvidence) -> FamilyFit:
 def _warped(mesh: Mesh, shape: FamilyShape, evidence: ShapeEvidence, fit: ContactFit) -> Mesh:
     places, offsets = moved_points(shape, evidence, ~_outliers(fit))
     sigma = np.full(len(places), POINT_SIGMA)
-    far = float(np.sqrt(np.mean(np.sum(offsets**2, axis=1)))) if fit.typical > OUTSIDE_CONTACT_COST else 0.0
+    far = (
+        float(np.sqrt(np.mean(np.sum(offsets**2, axis=1))))
+        if fit.typical > limits.OUTSIDE_CONTACT_COST
+        else 0.0
+    )
     moved = mesh.vertices + displacement(places - offsets, offsets, sigma, mesh.vertices, far)
     return Mesh(moved, mesh.faces)
 
@@ -172,7 +160,7 @@ def _outliers(fit: ContactFit) -> BoolArray:
 
     Where more do not fit, the shape is wrong, and the surface is moved to all of them.
     """
-    if len(fit.doubtful) and fit.doubtful.mean() > MAX_OUTLIER_FRACTION:
+    if len(fit.doubtful) and fit.doubtful.mean() > limits.MAX_OUTLIER_FRACTION:
         return np.zeros_like(fit.doubtful)
     return fit.doubtful
 
@@ -186,9 +174,15 @@ def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh, fit: ContactFit, sight
             gap = distances(shape.code, shape.theta, plain.vertices)
             total += weight / len(shapes) * gap**2
     moved = np.sum((mesh.vertices - plain.vertices) ** 2, axis=1)
-    under = (mesh.vertex_normals[:, 2] < UNDERSIDE_NORMAL) & (mesh.vertices[:, 2] < UNDERSIDE_HEIGHT)
-    known = (SPREAD_FACTOR**2 * total + 0.25 * moved + MIN_DEVIATION**2) * (1.0 + MISFIT_GAIN * fit.typical)
-    return np.asarray(np.sqrt(known + UNDERSIDE_DEVIATION**2 * under) * (1.0 if sighted else BLIND_FACTOR))
+    under = (mesh.vertex_normals[:, 2] < limits.UNDERSIDE_NORMAL) & (
+        mesh.vertices[:, 2] < limits.UNDERSIDE_HEIGHT
+    )
+    known = (limits.SPREAD_FACTOR**2 * total + 0.25 * moved + limits.MIN_DEVIATION**2) * (
+        1.0 + limits.MISFIT_GAIN * fit.typical
+    )
+    return np.asarray(
+        np.sqrt(known + limits.UNDERSIDE_DEVIATION**2 * under) * (1.0 if sighted else limits.BLIND_FACTOR)
+    )
 
 
 def _flags(
@@ -201,10 +195,10 @@ def _flags(
 ) -> list[str]:
     """State rival classes, a poor fit, and the contacts that do not fit, with the reason."""
     flags = []
-    rivals = [name for name, weight in mixture.by_class().items() if weight >= MIN_RIVAL_WEIGHT]
+    rivals = [name for name, weight in mixture.by_class().items() if weight >= limits.MIN_RIVAL_WEIGHT]
     if len(rivals) > 1:
         flags.append(f"class unknown: {' or '.join(rivals)}")
-    if fit.typical > OUTSIDE_CONTACT_COST:
+    if fit.typical > limits.OUTSIDE_CONTACT_COST:
         flags.append(
             f"outside the family: contacts are {np.median(fit.off) * 1e3:.1f} mm off the nearest such shape"
         )
@@ -247,10 +241,10 @@ def known_by(vertices: FloatArray, evidence: ShapeEvidence) -> IntArray:
         away = ndimage.distance_transform_edt(~(border & ~look.hidden))
         column, row = np.floor(places).astype(np.int64).T
         shown = (column >= 0) & (row >= 0) & (column < columns) & (row < rows) & (in_camera[:, 2] > 0.0)
-        known[np.flatnonzero(shown)[away[row[shown], column[shown]] <= BORDER_DISTANCE]] = SEEN
+        known[np.flatnonzero(shown)[away[row[shown], column[shown]] <= limits.BORDER_DISTANCE]] = SEEN
     points = [touch.points for touch in evidence.contacts]
     if points:
-        known[cKDTree(np.concatenate(points)).query(vertices)[0] <= FAMILY_TOUCH_DISTANCE] = TOUCHED
+        known[cKDTree(np.concatenate(points)).query(vertices)[0] <= limits.FAMILY_TOUCH_DISTANCE] = TOUCHED
     return known
 
 
@@ -272,15 +266,15 @@ def not_bounded(evidence: ShapeEvidence, mesh: Mesh, outside: bool) -> tuple[str
         edge = look.mask.copy()
         edge[1:-1, 1:-1] = False
         hidden = int((around & look.hidden).sum()) + int(edge.sum())
-        if hidden <= MAX_HIDDEN_BORDER * max(int(around.sum()), 1):  # enough of its border is seen
+        if hidden <= limits.MAX_HIDDEN_BORDER * max(int(around.sum()), 1):  # enough of its border is seen
             return open_without_class(evidence, mesh) if outside else ()
     normals = np.array([touch.mean_normal for touch in evidence.contacts]).reshape(-1, 3)
     supposed = beyond_contacts(mesh.vertices, evidence).max(axis=0)
     free = []
     for axis, name in enumerate("xyz"):
-        upper = bool((normals[:, axis] > MIN_LIMITING_NORMAL).any())
-        lower = axis == 2 or bool((normals[:, axis] < -MIN_LIMITING_NORMAL).any())
-        if not (upper and lower) or supposed[axis] > MAX_BEYOND_LAST:
+        upper = bool((normals[:, axis] > limits.MIN_LIMITING_NORMAL).any())
+        lower = axis == 2 or bool((normals[:, axis] < -limits.MIN_LIMITING_NORMAL).any())
+        if not (upper and lower) or supposed[axis] > limits.MAX_BEYOND_LAST:
             free.append(name)
     return tuple(free)
 

@@ -11,9 +11,9 @@ from typing import TypeVar, cast
 
 import numpy as np
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.kinds import kind_of
-from experiments.shape_reconstruction.thresholds import MAX_NUISANCE_COST
 from harness.basics.arrays import FloatArray, IntArray
 
 TILT = float(np.radians(0.8))
@@ -141,7 +141,7 @@ class NuisanceCost:
     @property
     def is_excessive(self) -> bool:
         """True if no calibrated bench has such errors."""
-        return self.cost > MAX_NUISANCE_COST
+        return self.cost > limits.MAX_NUISANCE_COST
 
 
 def nuisance_cost(theta: FloatArray, rows: FloatArray, middle: FloatArray) -> NuisanceCost:

@@ -13,13 +13,13 @@ from types import MappingProxyType
 
 import numpy as np
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.family.bent import BentBody
 from experiments.shape_reconstruction.family.kind import FamilyShape, Random, ShapeKind
 from experiments.shape_reconstruction.family.layout import CODE_SIZE, KIND
 from experiments.shape_reconstruction.family.revolution import BodyOfRevolution
 from experiments.shape_reconstruction.family.revolution_distance import HOLLOW
 from experiments.shape_reconstruction.family.tool import FlatTool
-from experiments.shape_reconstruction.thresholds import PART_RARITY, SIZE_SPREAD, SIZE_TAIL, SOLID_RARITY
 from harness.basics.arrays import FloatArray, IntArray
 
 KINDS: tuple[ShapeKind, ...] = (BodyOfRevolution(), FlatTool(), BentBody())
@@ -55,8 +55,8 @@ def rarity(shape: FamilyShape) -> float:
     """Compute the natural logarithm of how much rarer a combination of parts is than an ordinary one."""
     code = shape.code
     apart = (np.array(codes_of(shape.name)) != code).astype(np.float64)
-    apart[:, HOLLOW] *= SOLID_RARITY / PART_RARITY
-    price = PART_RARITY * float(apart.sum(axis=1).min()) + _UNNAMED.get(shape.name, 0.0)
+    apart[:, HOLLOW] *= limits.SOLID_RARITY / limits.PART_RARITY
+    price = limits.PART_RARITY * float(apart.sum(axis=1).min()) + _UNNAMED.get(shape.name, 0.0)
     return price + kind_of(code).rarity(code, shape.theta, not apart[:, HOLLOW].any())
 
 
@@ -80,7 +80,7 @@ def rarity_of_size(shape: FamilyShape) -> float:
     """
     middle, precision = _ordinary(shape.name)
     off = np.log(kind_of(shape.code).extent(shape.code, shape.theta)) - middle
-    return float(0.5 * (SIZE_TAIL + 2.0) * np.log1p(off @ precision @ off / SIZE_TAIL))
+    return float(0.5 * (limits.SIZE_TAIL + 2.0) * np.log1p(off @ precision @ off / limits.SIZE_TAIL))
 
 
 @lru_cache(maxsize=64)
@@ -90,5 +90,5 @@ def _ordinary(name: str) -> tuple[FloatArray, FloatArray]:
     shapes = [draw_shape(name, random) for _ in range(DRAWS)]
     kind = CLASSES[name]
     sizes = np.log([kind.extent(shape.code, shape.theta) for shape in shapes])
-    spread = np.cov(sizes.T) + SIZE_SPREAD**2 * np.eye(2)
+    spread = np.cov(sizes.T) + limits.SIZE_SPREAD**2 * np.eye(2)
     return np.asarray(sizes.mean(axis=0)), np.asarray(np.linalg.inv(spread))

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.freedom import basis_of
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.kinds import KINDS
 from experiments.shape_reconstruction.family.search import Hypothesis
-from experiments.shape_reconstruction.thresholds import MIN_WEIGHT, TEMPERATURE
 from harness.basics.arrays import FloatArray
 
 SAMPLES = 16
@@ -80,11 +80,13 @@ def mixture_of(found: list[Hypothesis], sighted: bool, touched: bool, seed: int)
     scores = np.empty(len(modes))
     for k, one in enumerate(modes):
         prior = _prior_precision(one, sighted, touched)
-        _, narrow = np.linalg.slogdet(one.curvature / TEMPERATURE + prior * (1.0 - 1.0 / TEMPERATURE))
+        _, narrow = np.linalg.slogdet(
+            one.curvature / limits.TEMPERATURE + prior * (1.0 - 1.0 / limits.TEMPERATURE)
+        )
         _, wide = np.linalg.slogdet(prior)
-        scores[k] = -one.cost / TEMPERATURE - 0.5 * (narrow - wide)
+        scores[k] = -one.cost / limits.TEMPERATURE - 0.5 * (narrow - wide)
     weights = np.exp(scores - scores.max())
-    order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] >= MIN_WEIGHT]
+    order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] >= limits.MIN_WEIGHT]
     kept = weights[order] / weights[order].sum()
     random = np.random.default_rng(seed)
     about = tuple(_drawn(modes[i], sighted, touched, random) for i in order)
@@ -98,7 +100,7 @@ def _of_one_mode(one: Hypothesis, other: Hypothesis, sighted: bool, touched: boo
     off = basis @ (one.shape.theta - other.shape.theta)
     turn = basis[:, layout.YAW] != 0.0
     off[turn] = np.arctan2(np.sin(off[turn]), np.cos(off[turn]))
-    precision = other.curvature / TEMPERATURE + _prior_precision(other, sighted, touched)
+    precision = other.curvature / limits.TEMPERATURE + _prior_precision(other, sighted, touched)
     return float(off @ precision @ off) < len(off)
 
 
@@ -117,7 +119,7 @@ def _drawn(
 ) -> tuple[FamilyShape, ...]:
     basis = basis_of(one.shape.code, sighted, touched)
     prior = _prior_precision(one, sighted, touched)
-    precision = one.curvature / TEMPERATURE + prior
+    precision = one.curvature / limits.TEMPERATURE + prior
     values, vectors = np.linalg.eigh(0.5 * (precision + precision.T))
     spread = vectors / np.sqrt(np.maximum(values, 1e-6))
     steps = random.standard_normal((SAMPLES, len(values))) @ spread.T

@@ -5,6 +5,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.family.kind import MM, FamilyShape, Random, ShapeKind, sample_length
 from experiments.shape_reconstruction.family.layout import REVOLUTION
 from experiments.shape_reconstruction.family.revolution_distance import (
@@ -23,7 +24,6 @@ from experiments.shape_reconstruction.family.revolution_distance import (
     SPOUT,
     SUPER,
 )
-from experiments.shape_reconstruction.thresholds import MIN_VESSEL_WIDTH, SOLID_RARITY
 from harness.basics.arrays import FloatArray, IntArray
 
 LOOPS, TURNS = 3, 8
@@ -332,12 +332,12 @@ class BodyOfRevolution(ShapeKind):
         # Vessels are widest at the top, and solid things are not.
         widens = radii[-1] > radii.max() - 0.1 and radii[-1] > radii[0] + 0.15
         if widens and code[HOLLOW] == 0 and agrees:
-            return SOLID_RARITY
+            return limits.SOLID_RARITY
         if code[PLAN] == CORED and code[HOLLOW] != 0:
             # No vessel with straight sides that is sampled is much longer than wide.
             sides = np.exp(theta[[SLOT.core_x, SLOT.core_y]]) + np.exp(radii.max())
-            if sides.min() < MIN_VESSEL_WIDTH * sides.max():
-                return SOLID_RARITY
+            if sides.min() < limits.MIN_VESSEL_WIDTH * sides.max():
+                return limits.SOLID_RARITY
         return 0.0
 
     def has_sides(self, code: IntArray) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.freedom import (
@@ -31,7 +32,6 @@ from experiments.shape_reconstruction.family.observed import FamilyEvidence, obs
 from experiments.shape_reconstruction.family.proposals import Guides, change, guides_of, perturb, place_sample
 from experiments.shape_reconstruction.family.residuals import prepared_room, rows_for
 from experiments.shape_reconstruction.family.settings import FamilySettings
-from experiments.shape_reconstruction.thresholds import SAME_SHAPE, TEMPERATURE
 from harness.basics.arrays import FloatArray
 
 PLACED = 0.6
@@ -169,7 +169,7 @@ class FamilySearch:
             code, one.shape.theta, self.full, one.prior, basis, last, rounds, last
         )
         shape = FamilyShape(one.shape.name, code, theta)
-        price = TEMPERATURE * (rarity(shape) + rarity_of_size(shape))
+        price = limits.TEMPERATURE * (rarity(shape) + rarity_of_size(shape))
         return Hypothesis(shape, one.prior, cost + price, curvature, price)
 
     # Stage 4: vary parts, then all parameters.
@@ -285,4 +285,4 @@ def _alike(a: FamilyShape, b: FamilyShape) -> bool:
     place = np.abs(a.theta[: layout.Y + 1] - b.theta[: layout.Y + 1]).max()
     # A difference of logarithms, of a length of 50 mm.
     own = np.abs(a.theta[layout.POSE_SIZE :] - b.theta[layout.POSE_SIZE :]).max() * 50e-3
-    return bool(max(place, own) < SAME_SHAPE)
+    return bool(max(place, own) < limits.SAME_SHAPE)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
-from experiments.shape_reconstruction.thresholds import MIN_PIXELS
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply, inverse
 
@@ -96,6 +96,6 @@ def shift_sigma(look: SeenMask, depth: float) -> float:
 def silhouette_of(evidence: ShapeEvidence, contacts: FloatArray) -> Silhouette | None:
     """The silhouette, shifted so that ``(n, 3)`` m of contacts are within it; None where nothing was seen."""
     look = evidence.look
-    if look is None or int(look.mask.sum()) < MIN_PIXELS or bool(look.mask.all()):
+    if look is None or int(look.mask.sum()) < limits.MIN_PIXELS or bool(look.mask.all()):
         return None
     return Silhouette.of(look, contacts)

@@ -8,7 +8,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 from skimage.graph import MCP_Geometric
 
-from experiments.shape_reconstruction.thresholds import MAX_PIECE_DISTANCE, MIN_PIECE_VOLUME
+from experiments.shape_reconstruction import thresholds as limits
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.faces.isosurface import isosurface
 from harness.basics.mesh import Mesh
@@ -122,7 +122,7 @@ def extract_body(
         if contacts is not None and len(contacts):
             corners = np.argwhere(labels > 0)
             scaled = (contacts - origin) / pitch
-            apart, nearest = cKDTree(corners).query(scaled, distance_upper_bound=MAX_PIECE_DISTANCE)
+            apart, nearest = cKDTree(corners).query(scaled, distance_upper_bound=limits.MAX_PIECE_DISTANCE)
             near = np.asarray(nearest)[np.isfinite(apart)]
             np.add.at(on_piece, labels[tuple(corners[near].T)], 1)
         field, notes = _join(field, pitch, labels, on_piece)
@@ -143,7 +143,7 @@ def _join(
     volumes = np.bincount(labels.ravel())
     volumes[0] = 0
     main = int(np.lexsort((volumes, on_piece))[-1])
-    wanted = (on_piece > 0) | (volumes >= MIN_PIECE_VOLUME * volumes[main])
+    wanted = (on_piece > 0) | (volumes >= limits.MIN_PIECE_VOLUME * volumes[main])
     wanted[[0, main]] = False
     removed = ~wanted
     removed[[0, main]] = False

@@ -12,6 +12,7 @@ from scipy import ndimage
 from scipy.linalg import cho_solve
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.fits import SmoothFit
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
@@ -37,7 +38,6 @@ from experiments.shape_reconstruction.smooth.revolution import (
     turned_room,
 )
 from experiments.shape_reconstruction.smooth.thin_plate import SurfaceData, ThinPlateField, fitted
-from experiments.shape_reconstruction.thresholds import MAX_PREDICTION_SIGMAS
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
 
@@ -350,6 +350,6 @@ def predict_by_field(evidence: ShapeEvidence, field: ThinPlateField) -> LeftOut:
         errors[number] = field.reach * float(np.sqrt(np.mean(off[values] ** 2)))
         mean = float(off[values].mean())
         sigma = float(np.sqrt(block[values, values].mean()))
-        if abs(mean) > MAX_PREDICTION_SIGMAS * sigma:
+        if abs(mean) > limits.MAX_PREDICTION_SIGMAS * sigma:
             found[contact.index] = abs(mean) * field.reach
     return LeftOut(errors, found)

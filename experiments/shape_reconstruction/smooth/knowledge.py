@@ -3,17 +3,10 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples
 from experiments.shape_reconstruction.smooth.free_space import Silhouette
 from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED
-from experiments.shape_reconstruction.thresholds import (
-    BORDER_DISTANCE,
-    MAX_ALONG_SIGHT,
-    MAX_END_DISTANCE,
-    MIN_MOUTH_DISTANCE,
-    MIN_SAME_FACING,
-    TOUCH_DISTANCE,
-)
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.mesh import Mesh
 
@@ -24,11 +17,11 @@ def known_by(mesh: Mesh, samples: ContactSamples | None, silhouette: Silhouette 
     """``(vertices,)`` of ``TOUCHED``, ``SEEN``, ``SUPPOSED``."""
     known = np.full(len(mesh.vertices), SUPPOSED, np.int64)
     if silhouette is not None:
-        known[np.abs(silhouette.outside_pixels(mesh.vertices)) < BORDER_DISTANCE] = SEEN
+        known[np.abs(silhouette.outside_pixels(mesh.vertices)) < limits.BORDER_DISTANCE] = SEEN
     if samples is not None:
         apart, nearest = cKDTree(samples.points).query(mesh.vertices)
-        alike = np.einsum("ij,ij->i", samples.normals[nearest], mesh.vertex_normals) > MIN_SAME_FACING
-        known[(apart < TOUCH_DISTANCE) & alike] = TOUCHED
+        alike = np.einsum("ij,ij->i", samples.normals[nearest], mesh.vertex_normals) > limits.MIN_SAME_FACING
+        known[(apart < limits.TOUCH_DISTANCE) & alike] = TOUCHED
     return known
 
 
@@ -45,13 +38,13 @@ def limited_sides(mesh: Mesh, samples: ContactSamples | None, silhouette: Silhou
         if silhouette is not None:
             mask, towards = silhouette.look.mask, float(silhouette.look.stand_from_camera[axis, 2])
             cut_off = bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())
-            across = not cut_off and abs(towards) < MAX_ALONG_SIGHT
+            across = not cut_off and abs(towards) < limits.MAX_ALONG_SIGHT
         for sign in (-1, 1):
             end = high[axis] if sign > 0 else low[axis]
-            near = MAX_END_DISTANCE * (high[axis] - low[axis])
+            near = limits.MAX_END_DISTANCE * (high[axis] - low[axis])
             touched = samples is not None and bool(
                 (
-                    (sign * samples.normals[:, axis] > MIN_SAME_FACING)
+                    (sign * samples.normals[:, axis] > limits.MIN_SAME_FACING)
                     & (np.abs(samples.points[:, axis] - end) < near)
                 ).any()
             )
@@ -86,8 +79,8 @@ def hollow_deviation(mesh: Mesh, known: IntArray, samples: ContactSamples) -> Fl
 
     Its bottom is then anywhere between the support and here: the root mean square of an even density.
     """
-    up = samples.points[samples.normals[:, 2] > MIN_SAME_FACING]
-    looking_up = (mesh.vertex_normals[:, 2] > MIN_SAME_FACING) & (known == SUPPOSED)
+    up = samples.points[samples.normals[:, 2] > limits.MIN_SAME_FACING]
+    looking_up = (mesh.vertex_normals[:, 2] > limits.MIN_SAME_FACING) & (known == SUPPOSED)
     if len(up):
-        looking_up &= np.asarray(cKDTree(up).query(mesh.vertices)[0]) > MIN_MOUTH_DISTANCE
+        looking_up &= np.asarray(cKDTree(up).query(mesh.vertices)[0]) > limits.MIN_MOUTH_DISTANCE
     return np.where(looking_up, np.maximum(mesh.vertices[:, 2], 0.0) / np.sqrt(3.0), 0.0)

@@ -11,18 +11,10 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples
 from experiments.shape_reconstruction.smooth.free_space import sensor_depth
-from experiments.shape_reconstruction.thresholds import (
-    MAX_AXIS_SINE,
-    MAX_OPEN_ANGLE,
-    MAX_PROFILE_ERROR,
-    MIN_AGREEING,
-    MIN_PAIRED,
-    MIN_PAIRED_TOUCHES,
-    MIN_RADIAL,
-)
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.geometry import rotation_about
 
@@ -70,26 +62,29 @@ def find_revolution(samples: ContactSamples, seed: int = 0) -> Revolution | None
     """
     side = np.flatnonzero(np.linalg.norm(samples.normals[:, :2], axis=1) > _HORIZONTAL)
     some = np.random.default_rng(seed).permutation(side)[:_MOST]
-    if len(some) < MIN_PAIRED:
+    if len(some) < limits.MIN_PAIRED:
         return None
     centre = _best_centre(samples.of(np.sort(some)))
     upright = samples.of(side)
-    radial = _aside(upright, centre) < MAX_AXIS_SINE
+    radial = _aside(upright, centre) < limits.MAX_AXIS_SINE
     pairs = zip(*_profile_errors(upright, centre), strict=True)
     # The median of how far each place is off its partners' profile, m; infinite without a partner.
     off = np.array([float(np.median(far[each])) if each.any() else np.inf for each, far in pairs])
     paired = np.isfinite(off)
-    if paired.sum() < MIN_PAIRED or len(np.unique(upright.touches[paired])) < MIN_PAIRED_TOUCHES:
+    if (
+        paired.sum() < limits.MIN_PAIRED
+        or len(np.unique(upright.touches[paired])) < limits.MIN_PAIRED_TOUCHES
+    ):
         return None
     weight = np.linalg.norm(upright.normals[:, :2], axis=1)
     share = float(weight[radial].sum() / weight.sum())
-    agreeing = float((radial & (off < MAX_PROFILE_ERROR))[paired].mean())
+    agreeing = float((radial & (off < limits.MAX_PROFILE_ERROR))[paired].mean())
     of_body = np.ones(len(samples.points), dtype=bool)
-    of_body[side] = radial & ~(off >= MAX_PROFILE_ERROR)
+    of_body[side] = radial & ~(off >= limits.MAX_PROFILE_ERROR)
     out = upright.points[radial, :2] - centre
     angles = np.sort(np.arctan2(out[:, 1], out[:, 0]))
     gap = float(np.diff(angles, append=angles[:1] + 2.0 * np.pi).max(initial=0.0))
-    believed = share >= MIN_RADIAL and agreeing >= MIN_AGREEING and gap <= MAX_OPEN_ANGLE
+    believed = share >= limits.MIN_RADIAL and agreeing >= limits.MIN_AGREEING and gap <= limits.MAX_OPEN_ANGLE
     return Revolution(centre, share, of_body) if believed else None
 
 
@@ -125,7 +120,7 @@ def _cost(side: ContactSamples, centre: FloatArray) -> float:
 
 def _normals_cost(side: ContactSamples, centre: FloatArray) -> float:
     horizontal = np.linalg.norm(side.normals[:, :2], axis=1)
-    return float((horizontal * np.minimum(_aside(side, centre) / MAX_AXIS_SINE, 1.0) ** 2).sum())
+    return float((horizontal * np.minimum(_aside(side, centre) / limits.MAX_AXIS_SINE, 1.0) ** 2).sum())
 
 
 def _aside(side: ContactSamples, centre: FloatArray) -> FloatArray:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.thresholds import MAX_CENTRE_OFFSET, MAX_LENGTH_RATIO, MAX_PLACE_SIGMAS
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.mesh import Mesh
@@ -15,7 +15,7 @@ _FAR = 100.0
 
 def max_offset(evidence: ShapeEvidence) -> float:
     """Greatest distance between the stated place and the support under the object, m."""
-    return MAX_PLACE_SIGMAS * evidence.place_error + MAX_CENTRE_OFFSET * evidence.largest
+    return limits.MAX_PLACE_SIGMAS * evidence.place_error + limits.MAX_CENTRE_OFFSET * evidence.largest
 
 
 def require_stated_space(evidence: ShapeEvidence) -> None:
@@ -53,7 +53,7 @@ def require_stated_space(evidence: ShapeEvidence) -> None:
     if not evidence.contacts:
         return
     points = np.concatenate([touch.points for touch in evidence.contacts])
-    reach = evidence.largest / np.sqrt(2.0) + MAX_PLACE_SIGMAS * evidence.place_error
+    reach = evidence.largest / np.sqrt(2.0) + limits.MAX_PLACE_SIGMAS * evidence.place_error
     off = float(np.linalg.norm(points[:, :2], axis=1).max())
     longest = longest_side(points)
     if off > reach:
@@ -62,7 +62,7 @@ def require_stated_space(evidence: ShapeEvidence) -> None:
             f"{evidence.place_error * 1e3:g} mm and largest {evidence.largest:g} m the object ends within "
             f"{reach:.2f} m; correct object.pose.position or these two"
         )
-    if longest > MAX_LENGTH_RATIO * evidence.largest:
+    if longest > limits.MAX_LENGTH_RATIO * evidence.largest:
         raise FitRefused(
             f"contacts are {longest:.2f} m apart, and [shape] largest is {evidence.largest:g} m; raise "
             "largest, or check whether the presses met one object"
@@ -81,7 +81,7 @@ def require_stated_size(mesh: Mesh, evidence: ShapeEvidence, method: str) -> Non
         FitRefused: its longest side is more than ``MAX_LENGTH_RATIO`` times ``largest``.
     """
     longest = longest_side(mesh.vertices)
-    if longest > MAX_LENGTH_RATIO * evidence.largest:
+    if longest > limits.MAX_LENGTH_RATIO * evidence.largest:
         raise FitRefused(
             f"the readings fit a body {longest:.2f} m long (method {method}), and [shape] largest is "
             f"{evidence.largest:g} m; check the camera's pose and where the object stands, or raise largest"
