@@ -79,7 +79,12 @@ class Family:
         self.begun.append(seeds)
         self.seeds.append(settings.seed)
         found = self.found[min(number, len(self.found) - 1)]
-        return replace(found, left_out=np.zeros(len(evidence.contacts)), flags=(f"search {number}",))
+        return replace(
+            found,
+            left_out=np.zeros(len(evidence.contacts)),
+            sighted=evidence.sighted,
+            flags=(f"search {number}",),
+        )
 
 
 GOOD, POOR = fit_of(), fit_of(residual=2.0)

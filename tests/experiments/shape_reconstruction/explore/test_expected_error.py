@@ -155,7 +155,7 @@ def test_a_line_that_ends_before_the_shape_meets_nothing() -> None:
 
 
 def test_shapes_that_agree_leave_the_press_to_go_where_none_was() -> None:
-    alike = family_fit(mixture_of(shape_at(0.0), shape_at(1.0e-3)))
+    alike = family_fit(mixture_of(shape_at(0.0), shape_at(1.0e-3)), mesh=build("mug"))
     assert error_spared(evidence(), alike, LINES) is None
     assert np.array_equal(most_informative(evidence(), alike, LINES), farthest(evidence(), alike, LINES))
 

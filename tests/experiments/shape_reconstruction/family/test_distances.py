@@ -136,7 +136,7 @@ def flat_sided(radius: float, half_depth: float) -> FamilyShape:
     code, theta = shape.code.copy(), shape.theta.copy()
     code[revolution.PLAN] = revolution.FLAT_SIDED
     theta[revolution.SLOT.radii] = np.log(radius)
-    theta[revolution.SLOT.radii] = np.log(WIDEST)
+    theta[revolution.SLOT.radii[0]] = np.log(WIDEST)
     theta[revolution.SLOT.across] = np.log(half_depth / WIDEST)
     theta[revolution.SLOT.height] = np.log(0.2)
     return FamilyShape(shape.name, code, theta)

@@ -173,7 +173,7 @@ def test_a_thin_board_far_outside_of_the_mask_is_wrong_by_more_than_it_is_thick(
     evaluate(board.code, board.theta, seen, False, out, prepared_room())
     passing = out.values[-len(seen.rays.kinds) :][seen.rays.kinds == PASS]
     met = passing[passing < 0.0]
-    thick = np.exp(board.theta[revolution.SLOT.radii])
+    thick = np.exp(board.theta[revolution.SLOT.radii[0]])
     assert len(met) > 3
     assert np.median(-met) * seen.rays.pixel > 3.0 * thick
 
