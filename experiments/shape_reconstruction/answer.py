@@ -4,9 +4,8 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from experiments.shape_reconstruction.dials import METHOD
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.methods import estimated
+from experiments.shape_reconstruction.methods import METHOD, estimated
 from experiments.shape_reconstruction.readings import ShapeReadings
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, WrongUse

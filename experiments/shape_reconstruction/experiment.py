@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from experiments.shape_reconstruction.answer import ShapeAnswering
 from experiments.shape_reconstruction.cells import CHOICES, MORE_OBJECTS, cells, scene_of
-from experiments.shape_reconstruction.dials import KNOBS, OWN
 from experiments.shape_reconstruction.explore.explorer import performer, plan, smallest_error, steps_of
+from experiments.shape_reconstruction.methods import KNOBS, OWN
 from experiments.shape_reconstruction.report import write
 from experiments.shape_reconstruction.result import lines_of, result_of, write_files
 from experiments.shape_reconstruction.section import ShapeRun

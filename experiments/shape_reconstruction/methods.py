@@ -11,7 +11,9 @@ from experiments.shape_reconstruction.smooth.hermite import by_hermite
 from experiments.shape_reconstruction.smooth.stated_space import require_stated_size, require_stated_space
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, OutOfDomain
-from harness.effects.accuracy import Level
+from harness.effects.accuracy import Knob, Level
+from harness.effects.catalogue import EFFECTS
+from harness.effects.effect import knobs_of
 
 Method = Callable[[ShapeEvidence], ShapeEstimate]
 
@@ -36,6 +38,11 @@ REMOVED: Mapping[Level, str] = {
 
 QUICK, BEST = "rbf", "family"
 """The method between two presses, and the default."""
+
+METHOD = Knob("shape.method", tuple(METHODS), "", "method", BEST, "estimator of the surface", REMOVED)
+OWN: tuple[Knob[Level], ...] = (METHOD,)
+KNOBS: tuple[Knob[Level], ...] = (*OWN, *knobs_of(EFFECTS))
+"""The knobs of a shape reconstruction: its estimator, and those of the simulation."""
 
 
 def estimated(method: str, evidence: ShapeEvidence, methods: Mapping[str, Method] = METHODS) -> ShapeEstimate:

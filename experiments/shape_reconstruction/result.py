@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 
 from experiments.shape_reconstruction.answer import SENSES, ShapeAnswer
-from experiments.shape_reconstruction.dials import METHOD
+from experiments.shape_reconstruction.methods import METHOD
 from experiments.shape_reconstruction.metric import published_chamfer, shape_error
 from experiments.shape_reconstruction.readings import base_from_stand
 from experiments.shape_reconstruction.section import ShapeRun

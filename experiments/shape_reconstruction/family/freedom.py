@@ -91,6 +91,13 @@ def bench_rows(place: float, support: float, pixel: float, shift: float, scale: 
     return np.array([_along(layout.POSE_SIZE, slot) / sigma for slot, sigma in sigmas.items()])
 
 
+def prior_rows(bench: FloatArray, own: FloatArray) -> FloatArray:
+    """Return ``(k, size)`` rows of a prior: those of the bench, then those of the parameters."""
+    rows = np.zeros((len(bench) + len(own), own.shape[1]))
+    rows[: len(bench), : layout.POSE_SIZE], rows[len(bench) :] = bench, own
+    return rows
+
+
 @_kept_by_code
 def shape_rows(code: IntArray) -> FloatArray:
     """Return ``(n, size)`` rows of a prior: each free parameter, and the section's second differences."""

@@ -32,16 +32,12 @@ TURNED_MODEL = float(np.radians(6.0))
 """Rad by which a normal of that shape is off the surface's, one standard deviation."""
 
 BENDING = 0.5
-"""Share of the spread of a contact's own normals that their mean is off by too: at a rim or an edge a normal
-depends on where the gel met it, and the nearest shape's edge is another one. Of 24 development runs answers
-by 4, 8 and 32 presses and a picture, and by 32 without, are 1.62, 1.35, 1.13 and 1.58 mm off without it, and
-1.51, 1.32, 1.07 and 1.35 with it."""
+"""Error of the mean normal over the spread of a contact's normals: at an edge it depends on the place of
+contact."""
 
-LOOSELY = 2.0
-"""Times a contact's deviation by which the housing's face may seem to be off a shape that met it. On 554 such
-ways of 48 development runs the true surface is within 1.6 mm of the face. But the place that touches jumps as
-a shape moves, and held as tightly as contacts are, more searches end in a wrong valley: 40 answers by 32
-blind presses are then 3.2 mm off in the mean, 2.8 with this, and 3.7 where a shape may keep off the face."""
+HOUSING_FACTOR = 2.0
+"""Factor on a contact's deviation for a housing in contact: its nearest place jumps as a shape moves, and a
+smaller factor leads more searches to a wrong local minimum."""
 
 _LEVEL_SIGHT = 0.1
 """A camera that looks less steeply down does not see places on the support apart."""
@@ -91,18 +87,12 @@ class FamilyEvidence(NamedTuple):
     face_gel: FloatArray  #: ``(h, 3, 3)`` rotations, stand from gel.
     face_sigma: FloatArray  #: ``(h,)`` m.
     free: FloatArray  #: ``(k, 3)`` m where the sensor was, so that the object is not.
-    place: float  #: ``(2,)`` reciprocal of m: of x and y.
-    support: float  #: m, one standard deviation of its height.
-    largest: float  #: m, no side is longer.
     rays: SightRays  #: of the picture; none without one.
     supposed: FloatArray  #: ``(s, 3)`` m where the surface is supposed to be.
     supposed_worth: float  #: weight of each such place's squared residual.
     supposed_right: FloatArray
-    """``(3,)`` m along the support that those are off by for each m that the camera is off to the picture's
-    right, and down."""
-    supposed_down: FloatArray
-    """``(3,)`` m along the support that those are off by for each m that the camera is off to the picture's
-    right, and down."""
+    """``(3,)`` shift of those along the support, m, per m that the camera is off to the picture's right."""
+    supposed_down: FloatArray  #: ``(3,)`` the same, downward in the picture.
 
 
 def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
@@ -146,11 +136,8 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
         clear_worth=np.array([min(1.0, CLEAR_WORTH / max(len(rows), 1)) for rows in clear]),
         faces=np.array(faces).reshape(-1, 3, 3),
         face_gel=np.array([touch.stand_from_gel[:3, :3] for touch in stopped]).reshape(-1, 3, 3),
-        face_sigma=np.array([LOOSELY * np.hypot(touch.sigma, MODEL) for touch in stopped]),
+        face_sigma=np.array([HOUSING_FACTOR * np.hypot(touch.sigma, MODEL) for touch in stopped]),
         free=_free_places(evidence, coarse),
-        place=evidence.place_error,
-        support=evidence.support_error,
-        largest=evidence.largest,
         rays=rays,
         supposed=np.ascontiguousarray(supposed),
         supposed_worth=SUPPOSED_WORTH / max(len(supposed), 1),
@@ -201,9 +188,6 @@ def _plate(sides: tuple[float, float], across: int, z: float) -> FloatArray:
 
 PASS, GRAZE, MEET = 0, 1, 2
 """Kinds of rays."""
-
-OUTLINE_SIGMA = 0.5
-"""Pixels, of where a mask's smoothed border leaves the outline."""
 
 OUTLINE_WORTH = 60.0
 """Independent readings that all grazing rays together count as at most: neighbours err alike."""

@@ -14,6 +14,7 @@ from experiments.shape_reconstruction.family.freedom import (
     basis_of,
     bench_rows,
     nuisance_cost,
+    prior_rows,
     shape_rows,
     stand_basis,
     stand_rows,
@@ -133,7 +134,7 @@ class FamilySearch:
         yaws = kind_of(shape.code).yaws(shape.code, self.settings.yaws)
         tried = place_sample(shape, self.guides, random, self._place_error, yaws)
         tried[:, layout.OUTLINE] = self._bench_middle[layout.OUTLINE]
-        prior = PriorRows(self._middle(tried[0]), self._prior_rows(stand_rows(shape.code)))
+        prior = PriorRows(self._middle(tried[0]), prior_rows(self._bench, stand_rows(shape.code)))
         best, cost = cheapest(shape.code, tried, self.coarse, prior, rows_for(self.coarse), prepared_room())
         placed = FamilyShape(shape.name, shape.code, tried[best])
         return Hypothesis(placed, prior, cost, np.empty((0, 0)))
@@ -235,18 +236,12 @@ class FamilySearch:
             shape: in ``stand``.
             middle: ``(size,)`` mean of the prior of its parameters.
         """
-        prior = PriorRows(self._middle(middle), self._prior_rows(shape_rows(shape.code)))
+        prior = PriorRows(self._middle(middle), prior_rows(self._bench, shape_rows(shape.code)))
         return Hypothesis(shape, prior, np.inf, np.empty((0, 0)))
 
     def nuisance(self, shape: FamilyShape) -> NuisanceCost:
         """Compute the cost of the bench errors that a shape needs."""
         return nuisance_cost(shape.theta, self._bench, self._bench_middle)
-
-    def _prior_rows(self, own: FloatArray) -> FloatArray:
-        """``(k, size)`` rows of the bench, then those of the parameters."""
-        bench = np.zeros((len(self._bench), own.shape[1]))
-        bench[:, : layout.POSE_SIZE] = self._bench
-        return np.concatenate([bench, own])
 
     def _middle(self, theta: FloatArray) -> FloatArray:
         middle = theta.copy()

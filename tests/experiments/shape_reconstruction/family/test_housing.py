@@ -10,7 +10,7 @@ from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.contact_rows import contact_row_count, nearest_on_face
 from experiments.shape_reconstruction.family.distance import distances, prepare
 from experiments.shape_reconstruction.family.kind import FamilyShape
-from experiments.shape_reconstruction.family.observed import LOOSELY, MODEL, observe
+from experiments.shape_reconstruction.family.observed import HOUSING_FACTOR, MODEL, observe
 from experiments.shape_reconstruction.family.residuals import (
     active_rows,
     evaluate,
@@ -66,7 +66,7 @@ def housing_rows(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
 @pytest.mark.parametrize("gap", [-3e-3, 0.0, 3e-3])
 def test_a_shape_before_the_face_disagrees_as_one_within_it_does(name: str, gap: float) -> None:
     shape, evidence = ended_at(name, gap)
-    sigma = LOOSELY * np.hypot(evidence.touches[-1].sigma, MODEL)
+    sigma = HOUSING_FACTOR * np.hypot(evidence.touches[-1].sigma, MODEL)
     rows = housing_rows(shape, evidence) * sigma
     assert len(rows) == 3
     # Within a thin wall no place is as deep as the face went.

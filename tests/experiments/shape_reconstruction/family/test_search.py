@@ -10,7 +10,7 @@ from experiments.shape_reconstruction.family import layout, tool
 from experiments.shape_reconstruction.family import revolution_distance as revolution
 from experiments.shape_reconstruction.family.contact_fit import contact_fit
 from experiments.shape_reconstruction.family.distance import distances
-from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, shape_rows
+from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, prior_rows, shape_rows
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.kinds import draw_shape, rarity
 from experiments.shape_reconstruction.family.minimize import PriorRows, cheapest, minimize, total_cost
@@ -32,7 +32,7 @@ def cost_of(shape: FamilyShape, seen: FamilyEvidence, robust: bool = True) -> fl
 
 
 def prior_of(shape: FamilyShape) -> PriorRows:
-    rows = np.concatenate([bench_rows(0.02, 1e-3, 2e-3, 3e-3, 5e-3), shape_rows(shape.code)])
+    rows = prior_rows(bench_rows(0.02, 1e-3, 2e-3, 3e-3, 5e-3), shape_rows(shape.code))
     middle = shape.theta.copy()
     middle[: layout.POSE_SIZE] = 0.0
     return PriorRows(middle, rows)
