@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import QhullError, cKDTree
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.prior.network import shipped, silhouette_to_glance_at
+from experiments.shape_reconstruction.prior.network import require_silhouette, shipped
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples
 from experiments.shape_reconstruction.smooth.free_space import (
     Silhouette,
@@ -23,7 +23,7 @@ from experiments.shape_reconstruction.smooth.knowledge import (
     limited_sides,
     not_bounded,
 )
-from experiments.shape_reconstruction.surface import SUPPOSED, ShapeEstimate
+from experiments.shape_reconstruction.surface import UNOBSERVED, ShapeEstimate
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import FitRefused
 from harness.basics.faces.mesh_rays import column_crossings
@@ -63,7 +63,7 @@ def by_average(evidence: ShapeEvidence) -> ShapeEstimate:
     return ShapeEstimate(
         mesh=Mesh(size * mesh.vertices, mesh.faces),
         deviation=np.full(count, spread),
-        known_by=np.full(count, SUPPOSED),
+        known_by=np.full(count, UNOBSERVED),
         not_bounded=("x", "y", "z"),
         doubtful={},
         flags=("the average household shape; no reading was used",),
@@ -244,7 +244,7 @@ def glance_points(evidence: ShapeEvidence) -> FloatArray:
     Raises:
         FitRefused: nothing was seen, the object fills the picture, or it is too large for the network.
     """
-    return interpolate(shipped().points(silhouette_to_glance_at(evidence).look))
+    return interpolate(shipped().points(require_silhouette(evidence).look))
 
 
 def interpolate(points: FloatArray, neighbours: int = NEIGHBOURS) -> FloatArray:

@@ -9,11 +9,11 @@ import numpy as np
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.prior.network import (
+    NOMINAL_FRAME,
     SIDE,
-    UNTOUCHED,
     WINDOW,
+    CameraYaw,
     PointFrame,
-    Turned,
     network_input,
     network_output,
     window_of,
@@ -100,7 +100,7 @@ class PaperCompletion:
         look = evidence.look
         if look is None and self.sense != "touch":
             raise FitRefused("the camera saw nothing of the object, and this network looks at it")
-        turned, frame, inputs = Turned.towards(look), UNTOUCHED, {}
+        turned, frame, inputs = CameraYaw.towards(look), NOMINAL_FRAME, {}
         if self.sense != "picture":
             points = turned.inward(all_samples(evidence).points)
             frame = frame_of(points)

@@ -87,9 +87,8 @@ class ShapeEvidence:
     place_error: float  #: m, one standard deviation per axis of where on the support the object was put.
     support_error: float  #: m, one standard deviation of the support's height.
     largest: float  #: m, no side of the object is longer.
-    supposed: FloatArray = field(default_factory=lambda: read_only(np.zeros((0, 3))))
-    """``(n, 3)`` m where the surface is supposed to be, by what was learnt from other objects; no reading,
-    and none unless an estimator asks for them."""
+    prior_points: FloatArray = field(default_factory=lambda: read_only(np.zeros((0, 3))))
+    """``(n, 3)`` points of the surface that the single-view prior predicts, m; no reading."""
     errors: BenchErrors = USUAL
     """standard deviations of the bench; contacts whose poses agree within them are one reading."""
 

@@ -5,9 +5,9 @@ from functools import partial
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
-from experiments.shape_reconstruction.prior.surface import by_glanced_surface
+from experiments.shape_reconstruction.prior.surface import predict_surface
 from experiments.shape_reconstruction.reconstruct import reconstruct, reconstruct_with_prior
-from experiments.shape_reconstruction.smooth.hermite import by_hermite
+from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.smooth.stated_space import require_stated_size, require_stated_space
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, OutOfDomain
@@ -18,8 +18,8 @@ from harness.effects.effect import knobs_of
 Method = Callable[[ShapeEvidence], ShapeEstimate]
 
 METHODS: Mapping[str, Method] = {
-    "glance": by_glanced_surface,
-    "rbf": by_hermite,
+    "glance": predict_surface,
+    "rbf": fit_rbf,
     "family-coarse": partial(reconstruct_with_prior, settings=LEVELS["coarse"]),
     "family": reconstruct_with_prior,
     "family-fine": partial(reconstruct_with_prior, settings=LEVELS["fine"]),

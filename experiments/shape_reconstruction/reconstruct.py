@@ -22,11 +22,11 @@ from experiments.shape_reconstruction.family.observed import directions_of
 from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
 from experiments.shape_reconstruction.family.settings import ANEW, FamilySettings
 from experiments.shape_reconstruction.fits import FamilyFit, SmoothFit, folds_of
-from experiments.shape_reconstruction.prior.network import with_supposed
-from experiments.shape_reconstruction.prior.surface import by_glanced_surface
+from experiments.shape_reconstruction.prior.network import with_prior_points
+from experiments.shape_reconstruction.prior.surface import predict_surface
 from experiments.shape_reconstruction.smooth.bent_prior import bend_prior
 from experiments.shape_reconstruction.smooth.free_space import shift_sigma
-from experiments.shape_reconstruction.smooth.hermite import by_hermite
+from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, OutOfDomain
@@ -47,7 +47,7 @@ def reconstruct_with_prior(evidence: ShapeEvidence, settings: FamilySettings | N
     """
     if not evidence.contacts:
         with suppress(FitRefused):  # the prior may not apply
-            return choose(None, None, by_glanced_surface(evidence))
+            return choose(None, None, predict_surface(evidence))
     return reconstruct(evidence, settings)
 
 
@@ -67,7 +67,7 @@ def reconstruct(
         OutOfDomain: nothing was touched or seen.
     """
     settings = settings or FamilySettings()
-    evidence = evidence if len(evidence.contacts) >= limits.MIN_CONTACTS else with_supposed(evidence)
+    evidence = evidence if len(evidence.contacts) >= limits.MIN_CONTACTS else with_prior_points(evidence)
     smooth = _smooth(evidence)
     try:
         fit = (
@@ -102,7 +102,7 @@ def _smooth(evidence: ShapeEvidence) -> SmoothFit | None:
             found.append(bend_prior(evidence))
     if not found or len(evidence.contacts) >= limits.MIN_CONTACTS:
         with suppress(OutOfDomain):  # contacts and free space may contradict each other
-            found.append(by_hermite(evidence, symmetric=False))  # the family has all classes of round bodies
+            found.append(fit_rbf(evidence, symmetric=False))  # the family has all classes of round bodies
     shown = [replace(one, outline_error=outline_error(one.mesh, evidence.look)) for one in found]
     best = min((one.outline_error for one in shown), default=0.0)
     alike = [one for one in shown if one.outline_error <= best + limits.MAX_OUTLINE_ERROR]

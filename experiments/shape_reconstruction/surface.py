@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.mesh import Mesh
 
-SUPPOSED, SEEN, TOUCHED = 0, 1, 2
+UNOBSERVED, SEEN, TOUCHED = 0, 1, 2
 """Of a vertex: neither touched nor at the border of the silhouette; seen; under a gel."""
 
 
@@ -16,7 +16,7 @@ class ShapeEstimate:
 
     mesh: Mesh  #: watertight, in the frame ``stand``, metres.
     deviation: FloatArray  #: ``(vertices,)`` m, one standard deviation of the surface along its normal.
-    known_by: IntArray  #: ``(vertices,)`` ``SUPPOSED``, ``SEEN`` or ``TOUCHED``.
+    known_by: IntArray  #: ``(vertices,)`` ``UNOBSERVED``, ``SEEN`` or ``TOUCHED``.
     not_bounded: tuple[str, ...]
     """names of the extents that no reading limits: ``"x"``, ``"y"``, ``"z"`` of ``stand``."""
     doubtful: Mapping[int, float]

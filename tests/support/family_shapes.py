@@ -12,7 +12,7 @@ from experiments.shape_reconstruction.family.minimize import PriorRows
 from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.family.search import Hypothesis
 from experiments.shape_reconstruction.fits import FamilyFit
-from experiments.shape_reconstruction.surface import SUPPOSED, TOUCHED
+from experiments.shape_reconstruction.surface import TOUCHED, UNOBSERVED
 from harness.basics.faces.isosurface import isosurface
 from harness.basics.mesh import Mesh
 
@@ -47,7 +47,7 @@ def family_fit(mixture: Mixture, **changes: Any) -> FamilyFit:
     """A fit of two vertices, the second of them touched, to 12 contacts that are met."""
     given: dict[str, Any] = {
         "mesh": Mesh(np.zeros((2, 3)), np.zeros((0, 3), np.int64)), "deviation": np.full(2, 1e-3),
-        "known_by": np.array([SUPPOSED, TOUCHED]), "not_bounded": (), "doubtful": {}, "flags": ("family",),
+        "known_by": np.array([UNOBSERVED, TOUCHED]), "not_bounded": (), "doubtful": {}, "flags": ("family",),
         "seconds": 1.0, "estimator": "family", "left_out": np.zeros(12), "contact_cost": 0.1,
         "other_cost": 0.0, "nuisance": NuisanceCost(0.0, ""), "beyond_contacts": 0.0, "sighted": True,
     }  # fmt: skip

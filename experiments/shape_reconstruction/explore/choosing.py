@@ -14,7 +14,7 @@ from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
 from experiments.shape_reconstruction.family.kind import FamilyShape
-from experiments.shape_reconstruction.family.rays import first_met
+from experiments.shape_reconstruction.family.rays import first_hit
 from experiments.shape_reconstruction.fits import FamilyFit
 from experiments.shape_reconstruction.section import Choice
 from experiments.shape_reconstruction.surface import ShapeEstimate
@@ -147,7 +147,7 @@ def readings_on(
     starts, ways = ways_of(lines, places, back)
     rows, found = np.arange(len(lines)), np.full((len(shapes), len(lines), 4), np.inf)
     for one, shape in zip(found, shapes, strict=True):
-        along = first_met(shape.code, shape.theta, starts, ways, back).reshape(-1, len(places))
+        along = first_hit(shape.code, shape.theta, starts, ways, back).reshape(-1, len(places))
         met, first = gel_first(along)
         gone = along[rows, first][met]
         depth = back - gone

@@ -18,7 +18,7 @@ from experiments.shape_reconstruction.family.contact_rows import SLIPPED, contac
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, farthest_points
-from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
+from experiments.shape_reconstruction.family.residuals import evaluate, make_rows, prepared_buffer
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.geometry import rotation_from_vector
 
@@ -43,7 +43,7 @@ class ContactFit:
 
 def contact_fit(shape: FamilyShape, seen: FamilyEvidence) -> ContactFit:
     """How the contacts fit a shape."""
-    out, q = rows_for(seen), prepared_room()
+    out, q = make_rows(seen), prepared_buffer()
     cost = evaluate(shape.code, shape.theta, seen, False, out, q)
     sums = np.asarray(contact_sums(seen, out.values))
     count = len(sums)
@@ -110,7 +110,7 @@ _STEPS = np.array([1e-4, 1e-4, 1e-4, 1e-2, 1e-2])
 _ROUNDS = 5
 
 
-def turned_contacts(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
+def find_rotated_contacts(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
     """``(contacts,)`` rad by which the pose of each contact is turned against a shape; 0 where it is right.
 
     It is turned where it fits much better turned, by more than ``MIN_TILT`` and thrice as far as the others.

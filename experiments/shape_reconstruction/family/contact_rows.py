@@ -36,12 +36,12 @@ def contact_row_count(seen: FamilyEvidence) -> int:
 def point_row(code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, i: int) -> float:
     """Distance of a touched point from the shape, in standard deviations."""
     j = seen.touch[i]
-    x, y, z = moved_by_gel(theta, seen.gel[j], seen.points[i])
+    x, y, z = shift_by_gel(theta, seen.gel[j], seen.points[i])
     return float(distance(code, q, False, x, y, z) / seen.sigma[j])
 
 
 @inlined
-def moved_by_gel(theta: FloatArray, turn: FloatArray, point: FloatArray) -> tuple[float, float, float]:
+def shift_by_gel(theta: FloatArray, turn: FloatArray, point: FloatArray) -> tuple[float, float, float]:
     """Where a place of the sensor is, were the gel off by what the shape's vector says.
 
     Args:
@@ -61,7 +61,7 @@ def normal_rows(
     code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, j: int, out: FloatArray
 ) -> None:
     """The gradient just outside a contact less its normal; four places give it."""
-    x, y, z = moved_by_gel(theta, seen.gel[j], seen.middles[j])
+    x, y, z = shift_by_gel(theta, seen.gel[j], seen.middles[j])
     h = NORMAL_STEP
     n = seen.normals[j]
     x, y, z = x + h * n[0], y + h * n[1], z + h * n[2]
@@ -76,7 +76,7 @@ def normal_rows(
 
 
 @compiled
-def contacts_off(seen: FamilyEvidence, points: FloatArray) -> FloatArray:
+def contact_offsets(seen: FamilyEvidence, points: FloatArray) -> FloatArray:
     """``(contacts,)`` m that each lies outside of the shape as a whole, by the rows of its points."""
     off, count = np.zeros(len(seen.middles)), np.zeros(len(seen.middles))
     for i in range(len(seen.points)):
@@ -92,7 +92,7 @@ def clear_row(
 ) -> float:
     """How deep the shape reaches into the gel where that touched nothing, were it moved to the contact."""
     j = seen.clear_touch[i]
-    x, y, z = moved_by_gel(theta, seen.gel[j], seen.clear[i])
+    x, y, z = shift_by_gel(theta, seen.gel[j], seen.clear[i])
     return float(min(distance(code, q, False, x, y, z) - off[j], 0.0) / CLEAR_SIGMA)
 
 
@@ -103,7 +103,7 @@ def weigh_contacts(seen: FamilyEvidence, robust: bool, values: FloatArray, weigh
     first = len(seen.points) + 3 * len(seen.middles)
     for i in range(len(seen.clear)):
         j = seen.clear_touch[i]
-        sums[j] += seen.clear_worth[j] * values[first + i] ** 2
+        sums[j] += seen.clear_weight[j] * values[first + i] ** 2
     cost = 0.0
     n = len(seen.points)
     factor = np.empty(len(sums))
@@ -120,9 +120,9 @@ def weigh_contacts(seen: FamilyEvidence, robust: bool, values: FloatArray, weigh
             factor[j] = np.sqrt(SLIPPED / s)
         weights[n + 3 * j : n + 3 * j + 3] = factor[j]
     for i in range(n):
-        weights[i] = factor[seen.touch[i]] * seen.worth[seen.touch[i]]
+        weights[i] = factor[seen.touch[i]] * seen.weight[seen.touch[i]]
     for i in range(len(seen.clear)):
-        weights[first + i] = factor[seen.clear_touch[i]] * seen.clear_worth[seen.clear_touch[i]]
+        weights[first + i] = factor[seen.clear_touch[i]] * seen.clear_weight[seen.clear_touch[i]]
     return cost
 
 
@@ -132,7 +132,7 @@ def contact_sums(seen: FamilyEvidence, values: FloatArray) -> FloatArray:
     sums = np.zeros(len(seen.middles))
     n = len(seen.points)
     for i in range(n):
-        sums[seen.touch[i]] += seen.worth[seen.touch[i]] * values[i] ** 2
+        sums[seen.touch[i]] += seen.weight[seen.touch[i]] * values[i] ** 2
     for j in range(len(sums)):
         for a in range(3):
             sums[j] += values[n + 3 * j + a] ** 2

@@ -15,8 +15,8 @@ from experiments.shape_reconstruction.family.contact_fit import (
     ContactFit,
     contact_fit,
     displacement,
+    find_rotated_contacts,
     moved_points,
-    turned_contacts,
 )
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import corners_of, median_surface
@@ -31,7 +31,7 @@ from experiments.shape_reconstruction.smooth.free_space import silhouette_of
 from experiments.shape_reconstruction.smooth.knowledge import beyond_deviation, limited_sides
 from experiments.shape_reconstruction.smooth.knowledge import not_bounded as open_axes
 from experiments.shape_reconstruction.smooth.stated_space import longest_side, max_offset
-from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED
+from experiments.shape_reconstruction.surface import SEEN, TOUCHED, UNOBSERVED
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.errors import FitRefused, OutOfDomain
 from harness.basics.geometry import apply, inverse
@@ -73,7 +73,7 @@ def fit_family(
     started = [search.start(seed.shape, seed.prior.middle) for seed in seeds]
     hypotheses = _at_stated_place(search.run(started), evidence)
     mixture = mixture_of(hypotheses, evidence.sighted, bool(evidence.contacts), settings.seed)
-    turned = turned_contacts(mixture.best.shape, evidence)
+    turned = find_rotated_contacts(mixture.best.shape, evidence)
     fit, nuisance = contact_fit(mixture.best.shape, search.full), search.nuisance(mixture.best.shape)
     fit = replace(fit, doubtful=fit.doubtful | (turned > 0.0))
     rejected = _outliers(fit)
@@ -229,8 +229,8 @@ def _flags(
 
 
 def known_by(vertices: FloatArray, evidence: ShapeEvidence) -> IntArray:
-    """``(n,)`` ``SUPPOSED``, ``SEEN`` or ``TOUCHED``."""
-    known = np.full(len(vertices), SUPPOSED, np.int64)
+    """``(n,)`` ``UNOBSERVED``, ``SEEN`` or ``TOUCHED``."""
+    known = np.full(len(vertices), UNOBSERVED, np.int64)
     look = evidence.look
     if look is not None and look.mask.any():
         in_camera = apply(inverse(look.stand_from_camera), vertices)
@@ -269,12 +269,12 @@ def not_bounded(evidence: ShapeEvidence, mesh: Mesh, outside: bool) -> tuple[str
         if hidden <= limits.MAX_HIDDEN_BORDER * max(int(around.sum()), 1):  # enough of its border is seen
             return open_without_class(evidence, mesh) if outside else ()
     normals = np.array([touch.mean_normal for touch in evidence.contacts]).reshape(-1, 3)
-    supposed = beyond_contacts(mesh.vertices, evidence).max(axis=0)
+    beyond = beyond_contacts(mesh.vertices, evidence).max(axis=0)
     free = []
     for axis, name in enumerate("xyz"):
         upper = bool((normals[:, axis] > limits.MIN_LIMITING_NORMAL).any())
         lower = axis == 2 or bool((normals[:, axis] < -limits.MIN_LIMITING_NORMAL).any())
-        if not (upper and lower) or supposed[axis] > limits.MAX_BEYOND_LAST:
+        if not (upper and lower) or beyond[axis] > limits.MAX_BEYOND_LAST:
             free.append(name)
     return tuple(free)
 

@@ -9,8 +9,8 @@ from experiments.shape_reconstruction.family.residuals import (
     Rows,
     active_rows,
     evaluate,
-    prepared_room,
-    rows_for,
+    make_rows,
+    prepared_buffer,
     slopes_along,
 )
 from harness.basics.arrays import FloatArray, IntArray
@@ -94,7 +94,7 @@ def minimize(
         not wanted.
     """
     best = theta.copy()
-    out, trial, q = rows_for(seen), rows_for(seen), prepared_room()
+    out, trial, q = make_rows(seen), make_rows(seen), prepared_buffer()
     cost = total_cost(code, best, seen, prior, robust, out, q)
     damping = 1e-2
     along = prior.rows @ basis.T

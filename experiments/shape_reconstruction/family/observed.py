@@ -15,23 +15,22 @@ from harness.basics.geometry import apply
 POINTS_A_TOUCH = 6
 """Points of a contact that are fitted: they span it, and more say the same again."""
 
-WORTH = 3.0
+POINT_WEIGHT = 3.0
 """Independent points that a contact counts as: its height and its two slopes."""
 
-CLEAR_WORTH = 4.0
+CLEAR_WEIGHT = 4.0
 """Independent places that those of a contact's gel that touched nothing count as, at most."""
 
-SUPPOSED, SUPPOSED_WORTH = 48, 8.0
-"""Places that are supposed which a shape is held against, and independent places that they count as together:
-those of one glance err together."""
+PRIOR_POINTS, PRIOR_WEIGHT = 48, 8.0
+"""Points of the single-view prior that a shape is compared with; independent points that they count as."""
 
 MODEL = 0.7e-3
 """M by which the nearest shape of the family is off a real surface, one standard deviation."""
 
-TURNED_MODEL = float(np.radians(6.0))
+NORMAL_MODEL = float(np.radians(6.0))
 """Rad by which a normal of that shape is off the surface's, one standard deviation."""
 
-BENDING = 0.5
+NORMAL_SPREAD_FACTOR = 0.5
 """Error of the mean normal over the spread of a contact's normals: at an edge it depends on the place of
 contact."""
 
@@ -53,7 +52,7 @@ class SightRays(NamedTuple):
     eye: FloatArray  #: ``(3,)`` m.
     directions: FloatArray  #: ``(n, 3)`` unit.
     kinds: IntArray  #: ``(n,)`` ``PASS``, ``GRAZE`` or ``MEET``.
-    worth: FloatArray  #: ``(n,)`` weight of each one's squared residual.
+    weight: FloatArray  #: ``(n,)`` weight of each one's squared residual.
     gain: FloatArray
     """``(n,)`` by which a distance counts for more than it is: a thin part far outside of the mask is as
     wrong as a thick one."""
@@ -72,7 +71,7 @@ class FamilyEvidence(NamedTuple):
     points: FloatArray  #: ``(n, 3)`` m of the surface.
     touch: IntArray  #: ``(n,)`` which contact each is of.
     sigma: FloatArray  #: ``(contacts,)`` m of each contact's points.
-    worth: FloatArray  #: ``(contacts,)`` weight of each point's squared residual.
+    weight: FloatArray  #: ``(contacts,)`` weight of each point's squared residual.
     middles: FloatArray  #: ``(contacts, 3)`` m, where the normals are taken.
     normals: FloatArray  #: ``(contacts, 3)`` unit, outward.
     normal_sigma: FloatArray  #: ``(contacts,)``.
@@ -80,7 +79,7 @@ class FamilyEvidence(NamedTuple):
     clear: FloatArray
     """``(c, 3)`` m on the gel's face, beside what contacts touched: the object is not there."""
     clear_touch: IntArray  #: ``(c,)`` which contact each is of.
-    clear_worth: FloatArray  #: ``(contacts,)`` weight of each such place's squared residual.
+    clear_weight: FloatArray  #: ``(contacts,)`` weight of each such place's squared residual.
     faces: FloatArray
     """``(h, 3, 3)`` m, of each housing that met the object with nothing in the gel: the middle of its face,
     and from there half of either side."""
@@ -88,11 +87,11 @@ class FamilyEvidence(NamedTuple):
     face_sigma: FloatArray  #: ``(h,)`` m.
     free: FloatArray  #: ``(k, 3)`` m where the sensor was, so that the object is not.
     rays: SightRays  #: of the picture; none without one.
-    supposed: FloatArray  #: ``(s, 3)`` m where the surface is supposed to be.
-    supposed_worth: float  #: weight of each such place's squared residual.
-    supposed_right: FloatArray
+    prior_points: FloatArray  #: ``(s, 3)`` points of the single-view prior, m.
+    prior_weight: float  #: weight of each such place's squared residual.
+    prior_right: FloatArray
     """``(3,)`` shift of those along the support, m, per m that the camera is off to the picture's right."""
-    supposed_down: FloatArray  #: ``(3,)`` the same, downward in the picture.
+    prior_down: FloatArray  #: ``(3,)`` the same, downward in the picture.
 
 
 def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
@@ -114,35 +113,35 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
         turn, half = touch.stand_from_gel[:3, :3], 0.5 * np.array(evidence.housing)
         middle = apply(touch.stand_from_gel, np.array([[0.0, 0.0, -evidence.gel_thickness]]))[0]
         faces.append([middle, half[0] * turn[:, 0], half[1] * turn[:, 1]])
-    most = SUPPOSED // 3 if coarse else SUPPOSED
-    supposed = evidence.supposed[:: max(-(-len(evidence.supposed) // most), 1)]
+    most = PRIOR_POINTS // 3 if coarse else PRIOR_POINTS
+    predicted = evidence.prior_points[:: max(-(-len(evidence.prior_points) // most), 1)]
     rays = no_rays() if evidence.look is None else sight_rays(evidence.look, coarse)
     return FamilyEvidence(
         points=_stacked(points, 3),
         touch=_numbered(points),
         sigma=sigma,
-        worth=np.array([min(WORTH, len(rows)) / len(rows) for rows in points]),
+        weight=np.array([min(POINT_WEIGHT, len(rows)) / len(rows) for rows in points]),
         middles=_stacked([touch.points.mean(axis=0)[None] for touch in contacts], 3),
         normals=_stacked([touch.mean_normal[None] for touch in contacts], 3),
         normal_sigma=np.array(
             [
-                np.hypot(np.hypot(one.normal_sigma, TURNED_MODEL), BENDING * one.normal_spread)
+                np.hypot(np.hypot(one.normal_sigma, NORMAL_MODEL), NORMAL_SPREAD_FACTOR * one.normal_spread)
                 for one in contacts
             ]
         ),
         gel=np.array([touch.stand_from_gel[:3, :3] for touch in contacts]).reshape(-1, 3, 3),
         clear=_stacked(clear, 3),
         clear_touch=_numbered(clear),
-        clear_worth=np.array([min(1.0, CLEAR_WORTH / max(len(rows), 1)) for rows in clear]),
+        clear_weight=np.array([min(1.0, CLEAR_WEIGHT / max(len(rows), 1)) for rows in clear]),
         faces=np.array(faces).reshape(-1, 3, 3),
         face_gel=np.array([touch.stand_from_gel[:3, :3] for touch in stopped]).reshape(-1, 3, 3),
         face_sigma=np.array([HOUSING_FACTOR * np.hypot(touch.sigma, MODEL) for touch in stopped]),
         free=_free_places(evidence, coarse),
         rays=rays,
-        supposed=np.ascontiguousarray(supposed),
-        supposed_worth=SUPPOSED_WORTH / max(len(supposed), 1),
-        supposed_right=_along_support(rays.right, rays.middle),
-        supposed_down=_along_support(rays.down, rays.middle),
+        prior_points=np.ascontiguousarray(predicted),
+        prior_weight=PRIOR_WEIGHT / max(len(predicted), 1),
+        prior_right=_along_support(rays.right, rays.middle),
+        prior_down=_along_support(rays.down, rays.middle),
     )
 
 
@@ -189,7 +188,7 @@ def _plate(sides: tuple[float, float], across: int, z: float) -> FloatArray:
 PASS, GRAZE, MEET = 0, 1, 2
 """Kinds of rays."""
 
-OUTLINE_WORTH = 60.0
+OUTLINE_WEIGHT = 60.0
 """Independent readings that all grazing rays together count as at most: neighbours err alike."""
 
 GAIN = 0.5
@@ -238,11 +237,11 @@ def sight_rays(look: SeenMask, coarse: bool) -> SightRays:
     outside, away = np.concatenate(around), np.concatenate(pixels_away)
     places = np.concatenate([outline, inside, outside])
     kinds = np.repeat([GRAZE, MEET, PASS], [len(outline), len(inside), len(outside)]).astype(np.int64)
-    worth = np.ones(len(places))
-    worth[: len(outline)] = min(1.0, OUTLINE_WORTH / max(len(outline), 1))
+    weight = np.ones(len(places))
+    weight[: len(outline)] = min(1.0, OUTLINE_WEIGHT / max(len(outline), 1))
     gain = np.ones(len(places))
     gain[len(places) - len(outside) :] += GAIN * away
-    return _rays(look, places, kinds, (worth, gain), _STEPS[which])
+    return _rays(look, places, kinds, (weight, gain), _STEPS[which])
 
 
 def _rays(
@@ -258,7 +257,7 @@ def _rays(
         eye=eye,
         directions=directions,
         kinds=kinds,
-        worth=weights[0],
+        weight=weights[0],
         gain=weights[1],
         pixel=away / look.focal_length,
         right=np.ascontiguousarray(rotation[:, 0]),

@@ -42,7 +42,7 @@ def ray_origin(theta: FloatArray, rays: SightRays, origin: FloatArray) -> None:
 
 
 @inlined
-def turned_ray(theta: FloatArray, rays: SightRays, i: int, towards: FloatArray) -> None:
+def ray_direction(theta: FloatArray, rays: SightRays, i: int, towards: FloatArray) -> None:
     """Fill in a ray's direction, were the picture's scale off by what the shape's vector says."""
     scale = theta[CAMERA_SCALE]
     for a in range(3):
@@ -214,7 +214,7 @@ def _between_levels(
 
 
 @compiled
-def first_met(
+def first_hit(
     code: IntArray, theta: FloatArray, starts: FloatArray, directions: FloatArray, length: float
 ) -> FloatArray:
     """How far along lines a shape is met first.

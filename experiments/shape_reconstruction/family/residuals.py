@@ -2,7 +2,7 @@
 
 One likelihood for touch, sight and both: what was not read has no rows. Rows: of each contact its points, its
 normal and the places where its gel touched nothing, every housing that met it, every free place, every ray,
-every place that is supposed. A contact counts as a whole: one that slipped loses all its weight.
+every point of the single-view prior. A contact counts as a whole: one that slipped loses all its weight.
 """
 
 from typing import NamedTuple
@@ -11,12 +11,12 @@ import numpy as np
 
 from experiments.shape_reconstruction.family.contact_rows import (
     clear_row,
+    contact_offsets,
     contact_row_count,
-    contacts_off,
     housing_row,
-    moved_by_gel,
     normal_rows,
     point_row,
+    shift_by_gel,
     weigh_contacts,
 )
 from experiments.shape_reconstruction.family.distance import ball, distance, inside_depth, prepare
@@ -36,10 +36,10 @@ from experiments.shape_reconstruction.family.rays import (
     held_distance,
     hold_ray,
     nearest_along,
+    ray_direction,
     ray_origin,
     ray_sigma,
     sighted,
-    turned_ray,
 )
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled, inlined
@@ -47,11 +47,11 @@ from harness.basics.compiled import compiled, inlined
 FREE_SIGMA = 1.0e-3
 """M by which the sensor's housing may seem to be inside the object."""
 
-SUPPOSED_SIGMA = 5.0e-3
-"""M by which a place that is supposed is off: a little more than a glance is on shapes held out."""
+PRIOR_SIGMA = 5.0e-3
+"""Standard deviation of a point of the single-view prior, m: a little more than on held-out shapes."""
 
 _BEND = 3.0
-"""Standard deviations beyond which a ray, a free or a supposed place costs in proportion, not its square."""
+"""Standard deviations beyond which rays, free places and predicted points cost in proportion, not squared."""
 
 
 class Rows(NamedTuple):
@@ -59,7 +59,7 @@ class Rows(NamedTuple):
 
     values: FloatArray  #: ``(rows,)``.
     weights: FloatArray
-    """``(rows,)`` by which a squared residual counts at this shape: worth times robustness."""
+    """``(rows,)`` by which a squared residual counts at this shape: weight times robustness."""
     along: FloatArray  #: ``(rays,)`` m along each ray where the shape is nearest.
     held: FloatArray
     """``(rays, 3)`` where each is held as derivatives are taken: two places, m, the second's share."""
@@ -73,8 +73,8 @@ def first_ray(seen: FamilyEvidence) -> int:
 
 
 @compiled
-def first_supposed(seen: FamilyEvidence) -> int:
-    """Row of the first place that is supposed."""
+def first_prior_row(seen: FamilyEvidence) -> int:
+    """Row of the first point of the single-view prior."""
     return int(first_ray(seen) + len(seen.rays.kinds))
 
 
@@ -106,7 +106,7 @@ def evaluate(
         out.values[i] = point_row(code, theta, seen, q, i)
     for j in range(m):
         normal_rows(code, theta, seen, q, j, out.values[n + 3 * j : n + 3 * j + 3])
-    off = contacts_off(seen, out.values)
+    off = contact_offsets(seen, out.values)
     for i in range(len(seen.clear)):
         out.values[n + 3 * m + i] = clear_row(code, theta, seen, q, off, i)
     cost = weigh_contacts(seen, robust, out.values, out.weights)
@@ -123,10 +123,10 @@ def evaluate(
     cost += _evaluate_rays(code, theta, seen, out, q, most - cost)
     if cost > most:
         return np.inf
-    for i in range(len(seen.supposed)):
-        row = first_supposed(seen) + i
-        out.values[row] = supposed_row(code, theta, seen, q, i)
-        cost += _weigh(row, seen.supposed_worth, out)
+    for i in range(len(seen.prior_points)):
+        row = first_prior_row(seen) + i
+        out.values[row] = prior_row(code, theta, seen, q, i)
+        cost += _weigh(row, seen.prior_weight, out)
     return cost
 
 
@@ -140,12 +140,12 @@ def _evaluate_rays(
     ray_origin(theta, rays, origin)
     to_middle -= origin
     for i in range(len(rays.kinds)):
-        turned_ray(theta, rays, i, towards)
+        ray_direction(theta, rays, i, towards)
         d, out.along[i] = nearest_along(
             code, q, origin, towards, radius, to_middle, rays.kinds[i] == MEET, rays.step
         )
         out.values[first + i] = sighted(theta, rays, i, d)
-        cost += _weigh(first + i, rays.worth[i], out)
+        cost += _weigh(first + i, rays.weight[i], out)
         if cost > most:
             return np.inf
     return cost
@@ -159,38 +159,38 @@ def free_row(code: IntArray, seen: FamilyEvidence, q: FloatArray, i: int) -> flo
 
 
 @inlined
-def supposed_row(code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, i: int) -> float:
-    """A place on the support is supposed where the camera sees it, and is off by what the camera is."""
-    p = seen.supposed[i]
+def prior_row(code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, i: int) -> float:
+    """Residual of a point of the single-view prior: it moves along the support with the camera's error."""
+    p = seen.prior_points[i]
     x, y, z = (
-        p[0] + theta[CAMERA_RIGHT] * seen.supposed_right[0] + theta[CAMERA_DOWN] * seen.supposed_down[0],
-        p[1] + theta[CAMERA_RIGHT] * seen.supposed_right[1] + theta[CAMERA_DOWN] * seen.supposed_down[1],
-        p[2] + theta[CAMERA_RIGHT] * seen.supposed_right[2] + theta[CAMERA_DOWN] * seen.supposed_down[2],
+        p[0] + theta[CAMERA_RIGHT] * seen.prior_right[0] + theta[CAMERA_DOWN] * seen.prior_down[0],
+        p[1] + theta[CAMERA_RIGHT] * seen.prior_right[1] + theta[CAMERA_DOWN] * seen.prior_down[1],
+        p[2] + theta[CAMERA_RIGHT] * seen.prior_right[2] + theta[CAMERA_DOWN] * seen.prior_down[2],
     )
-    return float(distance(code, q, False, x, y, z) / SUPPOSED_SIGMA)
+    return float(distance(code, q, False, x, y, z) / PRIOR_SIGMA)
 
 
 @compiled
-def _weigh(row: int, worth: float, out: Rows) -> float:
+def _weigh(row: int, weight: float, out: Rows) -> float:
     size = abs(out.values[row])
     if size <= _BEND:
-        out.weights[row] = worth
-        return float(0.5 * worth * size * size)
-    out.weights[row] = worth * _BEND / size
-    return float(worth * _BEND * (size - 0.5 * _BEND))
+        out.weights[row] = weight
+        return float(0.5 * weight * size * size)
+    out.weights[row] = weight * _BEND / size
+    return float(weight * _BEND * (size - 0.5 * _BEND))
 
 
 @compiled
-def rows_for(seen: FamilyEvidence) -> Rows:
+def make_rows(seen: FamilyEvidence) -> Rows:
     """Room for the rows of some readings."""
-    count = first_supposed(seen) + len(seen.supposed)
+    count = first_prior_row(seen) + len(seen.prior_points)
     rays = len(seen.rays.kinds)
     met = np.zeros((len(seen.faces), 3))
     return Rows(np.zeros(count), np.zeros(count), np.zeros(rays), np.zeros((rays, 3)), met)
 
 
 @compiled
-def prepared_room() -> FloatArray:
+def prepared_buffer() -> FloatArray:
     """Room for a shape's prepared numbers."""
     return np.empty(PREPARED)
 
@@ -228,11 +228,11 @@ def slopes_along(
     """
     base, here, moves = np.empty(len(active)), np.empty(len(active)), np.empty((3, len(active)))
     hold_rays(code, theta, seen, active, out, q)
-    frozen(code, theta, seen, active, out, False, q, base)
+    fill_frozen(code, theta, seen, active, out, False, q, base)
     for k in range(3):
         towards = np.zeros(len(theta))
         towards[_MOVES[k]] = NUDGE
-        frozen(code, theta + towards, seen, active, out, False, q, here)
+        fill_frozen(code, theta + towards, seen, active, out, False, q, here)
         moves[k] = (here - base) / NUDGE
     slopes = np.empty((len(basis), len(active)))
     for i in range(len(basis)):
@@ -245,7 +245,7 @@ def slopes_along(
             # The picture's scale changes no row of touch.
             scale = rest[CAMERA_SCALE] != 0.0 and np.count_nonzero(rest) == 1
             here[:] = base
-            frozen(code, theta + NUDGE * rest, seen, active, out, scale, q, here)
+            fill_frozen(code, theta + NUDGE * rest, seen, active, out, scale, q, here)
             slopes[i] += (here - base) / NUDGE
     return slopes
 
@@ -265,10 +265,10 @@ def _carried(
     """
     points, faces = len(seen.points), contact_row_count(seen)
     clear = points + 3 * len(seen.middles)
-    free, ray, supposed = faces + len(seen.faces), first_ray(seen), first_supposed(seen)
+    free, ray, prior = faces + len(seen.faces), first_ray(seen), first_prior_row(seen)
     right, down, nowhere = direction[CAMERA_RIGHT], direction[CAMERA_DOWN], np.zeros(3)
     seen_off = right * seen.rays.right + down * seen.rays.down
-    supposed_off = right * seen.supposed_right + down * seen.supposed_down
+    prior_off = right * seen.prior_right + down * seen.prior_down
     per_outline = direction[OUTLINE] / ray_sigma(seen.rays)
     for row in range(len(active)):
         i, x, y, z = active[row], 0.0, 0.0, 0.0
@@ -278,11 +278,11 @@ def _carried(
                 j = seen.touch[i]
             elif i >= clear:
                 j = seen.clear_touch[i - clear]
-            x, y, z = moved_by_gel(direction, seen.gel[j], nowhere)
+            x, y, z = shift_by_gel(direction, seen.gel[j], nowhere)
         elif i < free:
-            x, y, z = moved_by_gel(direction, seen.face_gel[i - faces], nowhere)
-        elif i >= supposed:
-            x, y, z = supposed_off[0], supposed_off[1], supposed_off[2]
+            x, y, z = shift_by_gel(direction, seen.face_gel[i - faces], nowhere)
+        elif i >= prior:
+            x, y, z = prior_off[0], prior_off[1], prior_off[2]
         elif i >= ray:
             x, y, z = seen_off[0], seen_off[1], seen_off[2]
         # What reads there is farther on by that: as if the body were farther back.
@@ -291,7 +291,7 @@ def _carried(
             + (direction[Y] - y) * moves[1, row]
             + (direction[LIFT] - z) * moves[2, row]
         )
-        if ray <= i < supposed and seen.rays.kinds[i - ray] == GRAZE:
+        if ray <= i < prior and seen.rays.kinds[i - ray] == GRAZE:
             out[row] -= per_outline
 
 
@@ -307,12 +307,12 @@ def hold_rays(
     for row in active:
         i = row - first
         if 0 <= i < len(rays.kinds):
-            turned_ray(theta, rays, i, towards)
+            ray_direction(theta, rays, i, towards)
             hold_ray(code, q, origin, towards, out.along[i], rays.step, out.held[i])
 
 
 @compiled
-def frozen(
+def fill_frozen(
     code: IntArray,
     theta: FloatArray,
     seen: FamilyEvidence,
@@ -330,7 +330,7 @@ def frozen(
         seen: readings.
         active: rows, ascending.
         held: where, as ``evaluate`` and ``hold_rays`` leave it.
-        of_sight: whether only rays, and what is supposed by the picture, are filled in.
+        of_sight: whether only rays and points of the single-view prior are filled in.
         q: room.
         out: ``(active,)``.
     """
@@ -354,18 +354,18 @@ def frozen(
             out[row] = triple[(i - n) % 3]
         elif i < first:
             if not len(off):
-                off = contacts_off(seen, out)  # all points are active: their rows are the first
+                off = contact_offsets(seen, out)  # all points are active: their rows are the first
             out[row] = clear_row(code, theta, seen, q, off, i - clear)
         elif i < free:
-            x, y, z = moved_by_gel(theta, seen.face_gel[i - first], held.met[i - first])
+            x, y, z = shift_by_gel(theta, seen.face_gel[i - first], held.met[i - first])
             out[row] = distance(code, q, False, x, y, z) / seen.face_sigma[i - first]
         elif i < ray:
             out[row] = free_row(code, seen, q, i - free)
-        elif i >= first_supposed(seen):
-            out[row] = supposed_row(code, theta, seen, q, i - first_supposed(seen))
+        elif i >= first_prior_row(seen):
+            out[row] = prior_row(code, theta, seen, q, i - first_prior_row(seen))
         else:
             i -= ray
-            turned_ray(theta, rays, i, towards)
+            ray_direction(theta, rays, i, towards)
             d = held_distance(code, q, origin, towards, held.held[i])
             out[row] = sighted(theta, rays, i, d)
 
@@ -373,7 +373,7 @@ def frozen(
 @compiled
 def active_rows(seen: FamilyEvidence, values: FloatArray) -> IntArray:
     """Rows that pull: of points, normals, housings and grazing rays all, of the others those not zero."""
-    first, end = len(seen.points) + 3 * len(seen.middles), first_supposed(seen)
+    first, end = len(seen.points) + 3 * len(seen.middles), first_prior_row(seen)
     rays = first_ray(seen)
     found = np.empty(len(values), np.int64)
     count = 0

@@ -31,7 +31,7 @@ from experiments.shape_reconstruction.family.kinds import (
 from experiments.shape_reconstruction.family.minimize import PriorRows, cheapest, minimize, total_cost
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
 from experiments.shape_reconstruction.family.proposals import Guides, change, guides_of, perturb, place_sample
-from experiments.shape_reconstruction.family.residuals import prepared_room, rows_for
+from experiments.shape_reconstruction.family.residuals import make_rows, prepared_buffer
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from harness.basics.arrays import FloatArray
 
@@ -135,7 +135,9 @@ class FamilySearch:
         tried = place_sample(shape, self.guides, random, self._place_error, yaws)
         tried[:, layout.OUTLINE] = self._bench_middle[layout.OUTLINE]
         prior = PriorRows(self._middle(tried[0]), prior_rows(self._bench, stand_rows(shape.code)))
-        best, cost = cheapest(shape.code, tried, self.coarse, prior, rows_for(self.coarse), prepared_room())
+        best, cost = cheapest(
+            shape.code, tried, self.coarse, prior, make_rows(self.coarse), prepared_buffer()
+        )
         placed = FamilyShape(shape.name, shape.code, tried[best])
         return Hypothesis(placed, prior, cost, np.empty((0, 0)))
 
@@ -206,7 +208,7 @@ class FamilySearch:
             yield from few[:CHANGES]
 
     def _costed(self, one: Hypothesis) -> Hypothesis:
-        out, q, shape = rows_for(self.coarse), prepared_room(), one.shape
+        out, q, shape = make_rows(self.coarse), prepared_buffer(), one.shape
         return replace(one, cost=total_cost(shape.code, shape.theta, self.coarse, one.prior, False, out, q))
 
     def _perturb_best(self, hypotheses: list[Hypothesis], random: Random) -> list[Hypothesis]:

@@ -20,7 +20,7 @@ from harness.basics.geometry import apply, inverse
 from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.runtime import Network
 
-GIVEN = 1024
+POINTS_GIVEN = 1024
 """Points that the network gives."""
 
 SIDE = 96
@@ -46,18 +46,18 @@ class PointFrame:
         return np.asarray(numbers * self.reach + self.middle)
 
 
-UNTOUCHED = PointFrame(np.zeros(3), 0.2)
+NOMINAL_FRAME = PointFrame(np.zeros(3), 0.2)
 """The frame of a picture alone: the nominal place of the object and about the size of one."""
 
 
 @dataclass(frozen=True)
-class Turned:
+class CameraYaw:
     """A rotation about the vertical through the origin of ``stand``."""
 
     angle: float  #: angle from the x axis of ``stand`` to the camera, rad.
 
     @classmethod
-    def towards(cls, look: SeenMask | None) -> "Turned":
+    def towards(cls, look: SeenMask | None) -> "CameraYaw":
         """Rotate the x axis under the camera of a picture; no rotation without a picture."""
         x, y = (1.0, 0.0) if look is None else look.stand_from_camera[:2, 3]
         return cls(float(np.arctan2(y, x)))
@@ -95,7 +95,7 @@ def window_points(frame: PointFrame, eye: FloatArray) -> FloatArray:
     return np.asarray(middle + across.reshape(-1, 1) * right - down.reshape(-1, 1) * up)
 
 
-def window_of(look: SeenMask, frame: PointFrame, turned: Turned) -> FloatArray:
+def window_of(look: SeenMask, frame: PointFrame, turned: CameraYaw) -> FloatArray:
     """Resample a silhouette: ``(1, SIDE, SIDE)``, 1 where a pixel's ray hits it, 0 elsewhere.
 
     Args:
@@ -140,7 +140,7 @@ _RIM[1:-1, 1:-1] = False
 
 
 @dataclass(frozen=True, eq=False)
-class Glance:
+class SingleViewPrior:
     """A trained network."""
 
     network: Network  #: the graph.
@@ -162,36 +162,37 @@ class Glance:
         return error
 
     def points(self, look: SeenMask) -> FloatArray:
-        """Predict ``(GIVEN, 3)`` points all over the object in ``stand``, its hidden side included, m.
+        """Predict ``(POINTS_GIVEN, 3)`` points all over the object in ``stand``, its hidden side included, m.
 
         Raises:
             FitRefused: the object extends beyond the window.
         """
-        turned = Turned.towards(look)
-        window = window_of(look, UNTOUCHED, turned)
+        turned = CameraYaw.towards(look)
+        window = window_of(look, NOMINAL_FRAME, turned)
         if window[0, _RIM].any():
+            limit = SPAN * NOMINAL_FRAME.reach * 1e3
             raise FitRefused(
-                f"the silhouette reaches farther than {SPAN * UNTOUCHED.reach * 1e3:.0f} mm from where the "
+                f"the silhouette reaches farther than {limit:.0f} mm from where the "
                 "object should stand, and the network looks no farther; check where it stands, or touch it"
             )
         found = np.asarray(
             self.network({"window": window[None].astype(np.float32)})["completed"][0], np.float64
         )
-        return turned.outward(UNTOUCHED.outward(found))
+        return turned.outward(NOMINAL_FRAME.outward(found))
 
 
-def with_supposed(evidence: ShapeEvidence) -> ShapeEvidence:
+def with_prior_points(evidence: ShapeEvidence) -> ShapeEvidence:
     """Add the points that the glance predicts; leave evidence unchanged that has them or allows none."""
-    if len(evidence.supposed):
+    if len(evidence.prior_points):
         return evidence
     try:
-        points = shipped().points(silhouette_to_glance_at(evidence).look)
+        points = shipped().points(require_silhouette(evidence).look)
     except FitRefused:
         return evidence
-    return replace(evidence, supposed=read_only(points))
+    return replace(evidence, prior_points=read_only(points))
 
 
-def silhouette_to_glance_at(evidence: ShapeEvidence) -> Silhouette:
+def require_silhouette(evidence: ShapeEvidence) -> Silhouette:
     """Return the silhouette of the picture.
 
     Raises:
@@ -207,16 +208,18 @@ def silhouette_to_glance_at(evidence: ShapeEvidence) -> Silhouette:
 
 
 @cache
-def shipped() -> Glance:
+def shipped() -> SingleViewPrior:
     """Open the network that comes with the program."""
     folder = files(__package__) / "data"
     return opened((folder / "glance.onnx").read_bytes(), (folder / "glance.json").read_text())
 
 
-def opened(data: bytes, card: str) -> Glance:
+def opened(data: bytes, card: str) -> SingleViewPrior:
     """Open a network from the bytes of its graph and its card.
 
     Raises:
         DataRefused: the graph must not be run, or is not that of a glance.
     """
-    return Glance(Network(data, "glance.onnx", [WINDOW], [network_output(GIVEN)]), json.loads(card))
+    return SingleViewPrior(
+        Network(data, "glance.onnx", [WINDOW], [network_output(POINTS_GIVEN)]), json.loads(card)
+    )

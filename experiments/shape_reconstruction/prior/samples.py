@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from scipy.ndimage import binary_fill_holes
 
-from experiments.shape_reconstruction.prior.network import SIDE, UNTOUCHED, PointFrame, window_points
+from experiments.shape_reconstruction.prior.network import NOMINAL_FRAME, SIDE, PointFrame, window_points
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import rotation_about
@@ -100,9 +100,9 @@ def _looks_at(each: int, seed: int, number: int) -> list[SampleRow]:
     rows: list[SampleRow] = []
     for _ in range(each):
         turn, put = draw_pose(random)
-        window = silhouette_window(rays, UNTOUCHED, turn, put, random)
-        whole = UNTOUCHED.inward(everywhere @ turn.T + put).astype(np.float32)
-        rows.append(({"window": window}, whole, UNTOUCHED.reach))
+        window = silhouette_window(rays, NOMINAL_FRAME, turn, put, random)
+        whole = NOMINAL_FRAME.inward(everywhere @ turn.T + put).astype(np.float32)
+        rows.append(({"window": window}, whole, NOMINAL_FRAME.reach))
     return rows
 
 

@@ -8,7 +8,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.prior.network import shipped, silhouette_to_glance_at
+from experiments.shape_reconstruction.prior.network import require_silhouette, shipped
 from experiments.shape_reconstruction.smooth.free_space import Silhouette
 from experiments.shape_reconstruction.smooth.grid import BodySurface, Grid
 from experiments.shape_reconstruction.smooth.knowledge import known_by, limited_sides, not_bounded
@@ -30,7 +30,7 @@ SPREAD = float(np.sqrt(0.5 * np.pi))
 """Standard deviation of a normal density over the mean of its absolute values."""
 
 
-def by_glanced_surface(evidence: ShapeEvidence) -> ShapeEstimate:
+def predict_surface(evidence: ShapeEvidence) -> ShapeEstimate:
     """Answer with a closed surface around the points of the glance; no contact is used.
 
     The deviation is the network's error on held-out shapes, and twice the distance of its points outside of
@@ -41,7 +41,7 @@ def by_glanced_surface(evidence: ShapeEvidence) -> ShapeEstimate:
         FitRefused: nothing was seen, the object fills the picture, or it is too large for the network.
     """
     start = time.perf_counter()
-    seen = silhouette_to_glance_at(evidence)
+    seen = require_silhouette(evidence)
     points = shipped().points(seen.look)
     body = closed_around(points)
     mesh, deviation = body.mesh, prior_deviation(seen, points)

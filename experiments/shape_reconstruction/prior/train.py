@@ -47,9 +47,9 @@ def _train(options: argparse.Namespace) -> None:
     chosen_networks(options.only, ("glance",))
     require_torch()
     device = device_of(options.device)
-    from experiments.shape_reconstruction.prior.training import train_glance  # needs torch
+    from experiments.shape_reconstruction.prior.training import train_prior  # needs torch
 
-    train = partial(train_glance, amounts, options.seed, options.processes, device)
+    train = partial(train_prior, amounts, options.seed, options.processes, device)
     write_network("glance", train, options.to or Path(__file__).parent / "data", options.profile)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from experiments.shape_reconstruction.prior.network import GIVEN, SIDE
+from experiments.shape_reconstruction.prior.network import POINTS_GIVEN, SIDE
 from experiments.shape_reconstruction.prior.samples import (
     SIZES,
     CompletionProfile,
@@ -35,26 +35,26 @@ NARROW, CODE = 32, 512
 _LAST = SIDE >> (len(CHANNELS) - 1)
 
 
-class GlanceNetwork(nn.Module):
-    """From ``(n, 1, SIDE, SIDE)`` to ``(n, GIVEN, 3)``."""
+class PriorNetwork(nn.Module):
+    """From ``(n, 1, SIDE, SIDE)`` to ``(n, POINTS_GIVEN, 3)``."""
 
     def __init__(self) -> None:
         super().__init__()
         self.blocks = nn.ModuleList([ResidualBlock(*widths, 2) for widths in pairwise(CHANNELS)])
         self.narrow = convolution(CHANNELS[-1], NARROW, 1, 1)
         self.decoder = nn.ModuleList(
-            [nn.Linear(NARROW * _LAST**2, CODE), nn.Linear(CODE, CODE), nn.Linear(CODE, 3 * GIVEN)]
+            [nn.Linear(NARROW * _LAST**2, CODE), nn.Linear(CODE, CODE), nn.Linear(CODE, 3 * POINTS_GIVEN)]
         )
 
     def forward(self, window: Tensor) -> tuple[list[Tensor], Tensor]:
-        """Return no coarse cloud, and ``(n, GIVEN, 3)``."""
+        """Return no coarse cloud, and ``(n, POINTS_GIVEN, 3)``."""
         found = window
         for block in self.blocks:
             found = block(found)
         hidden = torch.relu(self.narrow(found)).flatten(1)
         for layer in list(self.decoder)[:-1]:
             hidden = torch.relu(layer(hidden))
-        return [], self.decoder[-1](hidden).reshape(-1, GIVEN, 3)
+        return [], self.decoder[-1](hidden).reshape(-1, POINTS_GIVEN, 3)
 
     def graph(self) -> bytes:
         """Write the network as a graph from ``window`` to ``completed``."""
@@ -66,9 +66,11 @@ class GlanceNetwork(nn.Module):
         for layer in list(self.decoder)[:-1]:
             hidden = nodes.add("Relu", linear(nodes, hidden, layer))
         flat = linear(nodes, hidden, self.decoder[-1])
-        nodes.add("Reshape", flat, nodes.constant(np.array([-1, GIVEN, 3], np.int64)), name="completed")
+        nodes.add(
+            "Reshape", flat, nodes.constant(np.array([-1, POINTS_GIVEN, 3], np.int64)), name="completed"
+        )
         inputs = [float_value("window", ("n", 1, SIDE, SIDE))]
-        outputs = [float_value("completed", ("n", GIVEN, 3))]
+        outputs = [float_value("completed", ("n", POINTS_GIVEN, 3))]
         what = "The silhouette of an object to points all over it."
         return bytes(nodes.model("glance", inputs, outputs, what).SerializeToString())
 
@@ -82,14 +84,14 @@ def linear(nodes: Nodes, value: str, layer: Any) -> str:
     return nodes.add("Add", product, nodes.weight(layer.bias.detach().numpy(), "a bias"))
 
 
-def train_glance(
+def train_prior(
     amounts: CompletionProfile, seed: int, processes: int, device: str
 ) -> tuple[bytes, dict[str, Any]]:
     """Train the network of the glance; return the bytes of its graph, and its card."""
     torch.set_num_threads(1)  # the same bits on every machine
     samples = look_samples(amounts.shapes, amounts.sets, seed, processes)
-    what = f"{GIVEN} points all over an object, from its silhouette in {SIDE} x {SIDE} pixels"
-    return train_completion("glance", GlanceNetwork, samples, amounts, seed, device, {"what": what})
+    what = f"{POINTS_GIVEN} points all over an object, from its silhouette in {SIDE} x {SIDE} pixels"
+    return train_completion("glance", PriorNetwork, samples, amounts, seed, device, {"what": what})
 
 
 HELD_OUT = 0.1

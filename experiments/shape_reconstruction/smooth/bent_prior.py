@@ -11,7 +11,7 @@ from scipy.spatial.distance import cdist
 
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.fits import SmoothFit, folds_of
-from experiments.shape_reconstruction.prior.network import shipped, silhouette_to_glance_at
+from experiments.shape_reconstruction.prior.network import require_silhouette, shipped
 from experiments.shape_reconstruction.prior.surface import BLUR, closing_field, prior_deviation
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
 from experiments.shape_reconstruction.smooth.free_space import CLEARANCE, Silhouette, sensor_depth
@@ -61,7 +61,7 @@ def bend_prior(evidence: ShapeEvidence) -> SmoothFit:
     """
     start = time.perf_counter()
     whole = all_samples(evidence)
-    unshifted = silhouette_to_glance_at(evidence)
+    unshifted = require_silhouette(evidence)
     silhouette = Silhouette.of(unshifted.look, whole.points)
     samples = thinned(whole)
     grid, field, prior_error = _prior_distance(unshifted.look)

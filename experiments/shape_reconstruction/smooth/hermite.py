@@ -33,9 +33,9 @@ from experiments.shape_reconstruction.smooth.knowledge import (
 from experiments.shape_reconstruction.smooth.revolution import (
     SLACK,
     Revolution,
-    TurnedRoom,
+    RotatedSpace,
     find_revolution,
-    turned_room,
+    rotated_space,
 )
 from experiments.shape_reconstruction.smooth.thin_plate import SurfaceData, ThinPlateField, fitted
 from harness.basics.arrays import FloatArray
@@ -77,7 +77,7 @@ class _Bounds:
     evidence: ShapeEvidence
     places: FloatArray
     silhouette: Silhouette | None
-    room: TurnedRoom | None
+    room: RotatedSpace | None
 
     def beyond(self, points: FloatArray) -> FloatArray:
         """``(n,)`` m that points are outside; below 0 within."""
@@ -123,7 +123,7 @@ class RbfFit(SmoothFit):
         }
 
 
-def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> RbfFit:
+def fit_rbf(evidence: ShapeEvidence, symmetric: bool = True) -> RbfFit:
     """The zero of a thin-plate field through the contacts, cut by all that is known to be free.
 
     Args:
@@ -150,7 +150,7 @@ def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> RbfFit:
         data = data.joined(_copies(axis, samples, evidence, silhouette))
         low, high = _box(data.points, evidence.largest)
         field = fitted(data, low, high, by_contacts.amplitude)
-    room = None if axis is None else turned_room(axis, samples, evidence)
+    room = None if axis is None else rotated_space(axis, samples, evidence)
     bounds = _Bounds(evidence, data.points, silhouette, room)
     if silhouette is not None:
         rim = rim_data(silhouette, _cut(field, bounds), data.points, low, high)

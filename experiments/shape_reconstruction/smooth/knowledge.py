@@ -1,4 +1,4 @@
-"""How each part of an answer is known: touched, seen or supposed; which of its extents nothing limits."""
+"""Sources of each part of an answer: touched, seen or unobserved; extents that nothing limits."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples
 from experiments.shape_reconstruction.smooth.free_space import Silhouette
-from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED
+from experiments.shape_reconstruction.surface import SEEN, TOUCHED, UNOBSERVED
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.mesh import Mesh
 
@@ -14,8 +14,8 @@ Sides = dict[tuple[str, int], bool]
 
 
 def known_by(mesh: Mesh, samples: ContactSamples | None, silhouette: Silhouette | None) -> IntArray:
-    """``(vertices,)`` of ``TOUCHED``, ``SEEN``, ``SUPPOSED``."""
-    known = np.full(len(mesh.vertices), SUPPOSED, np.int64)
+    """``(vertices,)`` of ``TOUCHED``, ``SEEN``, ``UNOBSERVED``."""
+    known = np.full(len(mesh.vertices), UNOBSERVED, np.int64)
     if silhouette is not None:
         known[np.abs(silhouette.outside_pixels(mesh.vertices)) < limits.BORDER_DISTANCE] = SEEN
     if samples is not None:
@@ -58,7 +58,7 @@ def not_bounded(sides: Sides) -> tuple[str, ...]:
 
 
 def beyond_deviation(mesh: Mesh, known: IntArray, sides: Sides, largest: float) -> FloatArray:
-    """``(vertices,)`` m, one standard deviation of what is supposed towards sides that nothing limits.
+    """``(vertices,)`` m, one standard deviation of unobserved parts towards sides that nothing limits.
 
     The object ends anywhere between the answer's end and the greatest length that is possible: an even
     density's deviation, as far as the vertex looks that way.
@@ -71,7 +71,7 @@ def beyond_deviation(mesh: Mesh, known: IntArray, sides: Sides, largest: float) 
         if not limited:
             looking = np.maximum(sign * mesh.vertex_normals[:, axis], 0.0)
             np.maximum(deviation, room * looking, out=deviation)
-    return np.where(known == SUPPOSED, deviation, 0.0)
+    return np.where(known == UNOBSERVED, deviation, 0.0)
 
 
 def hollow_deviation(mesh: Mesh, known: IntArray, samples: ContactSamples) -> FloatArray:
@@ -80,7 +80,7 @@ def hollow_deviation(mesh: Mesh, known: IntArray, samples: ContactSamples) -> Fl
     Its bottom is then anywhere between the support and here: the root mean square of an even density.
     """
     up = samples.points[samples.normals[:, 2] > limits.MIN_SAME_FACING]
-    looking_up = (mesh.vertex_normals[:, 2] > limits.MIN_SAME_FACING) & (known == SUPPOSED)
+    looking_up = (mesh.vertex_normals[:, 2] > limits.MIN_SAME_FACING) & (known == UNOBSERVED)
     if len(up):
         looking_up &= np.asarray(cKDTree(up).query(mesh.vertices)[0]) > limits.MIN_MOUTH_DISTANCE
     return np.where(looking_up, np.maximum(mesh.vertices[:, 2], 0.0) / np.sqrt(3.0), 0.0)

@@ -162,7 +162,7 @@ _ROOM_MARGIN = 20.0e-3
 
 
 @dataclass(frozen=True, eq=False)
-class TurnedRoom:
+class RotatedSpace:
     """What is free about an axis, over the distance from it and the height."""
 
     centre: FloatArray  #: ``(2,)`` m, of the axis in ``stand``.
@@ -176,7 +176,7 @@ class TurnedRoom:
         return np.asarray(ndimage.map_coordinates(self.depth, at, order=1, mode="nearest"))
 
 
-def turned_room(axis: Revolution, samples: ContactSamples, evidence: ShapeEvidence) -> TurnedRoom | None:
+def rotated_space(axis: Revolution, samples: ContactSamples, evidence: ShapeEvidence) -> RotatedSpace | None:
     """The union of what all downward touches cleared, those that met nothing too; None where none went down.
 
     A touch whose room, turned, would hold a place that was met says that the body is not round there, and
@@ -193,7 +193,7 @@ def turned_room(axis: Revolution, samples: ContactSamples, evidence: ShapeEviden
     for touch in evidence.touches:
         if touch.stand_from_gel[2, 2] < -_DOWNWARD and touch.stand_from_gel[2, 3] < top - BELOW:
             deep = sensor_depth(replace(evidence, touches=(touch,)), places.reshape(-1, 3))
-            room = TurnedRoom(axis.centre, np.asarray(deep.reshape(r.shape).max(axis=2)))
+            room = RotatedSpace(axis.centre, np.asarray(deep.reshape(r.shape).max(axis=2)))
             if room.at(samples.points).max() <= SLACK:
                 found = room if found is None else replace(found, depth=np.maximum(found.depth, room.depth))
     return found

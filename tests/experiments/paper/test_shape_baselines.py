@@ -19,9 +19,9 @@ from experiments.paper.shape_baselines import (
 from experiments.paper.shape_table import points_error
 from experiments.shape_reconstruction.metric import shape_error
 from experiments.shape_reconstruction.smooth.contact_samples import all_samples
-from experiments.shape_reconstruction.smooth.hermite import by_hermite
+from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.smooth.knowledge import beyond_deviation, known_by, limited_sides
-from experiments.shape_reconstruction.surface import SUPPOSED
+from experiments.shape_reconstruction.surface import UNOBSERVED
 from harness.basics.errors import FitRefused
 from harness.basics.faces.mesh_rays import is_inside
 from harness.objects.builtin import build
@@ -54,7 +54,7 @@ def test_a_hull_too_thin_for_its_grid_is_refused_by_what_was_touched() -> None:
 
 def test_the_surface_through_contacts_is_better_than_their_hull() -> None:
     evidence = evidence_of(TOUCHES)
-    ours = shape_error(by_hermite(evidence).mesh, MUG, samples=4000)
+    ours = shape_error(fit_rbf(evidence).mesh, MUG, samples=4000)
     assert ours.chamfer < shape_error(by_hull(evidence).mesh, MUG, samples=4000).chamfer
 
 
@@ -74,7 +74,7 @@ def test_the_average_shape_looks_at_nothing_and_is_worse_than_touch() -> None:
     require_whole(answer)
     assert np.array_equal(answer.mesh.vertices, by_average(BOTH).mesh.vertices)
     assert answer.not_bounded == ("x", "y", "z")
-    touched = shape_error(by_hermite(evidence_of(TOUCHES[:8])).mesh, MUG, samples=3000).chamfer
+    touched = shape_error(fit_rbf(evidence_of(TOUCHES[:8])).mesh, MUG, samples=3000).chamfer
     assert shape_error(answer.mesh, MUG, samples=3000).chamfer > touched
 
 
@@ -110,7 +110,7 @@ def test_a_plain_body_is_as_unsure_as_it_is_far_from_contacts_and_as_its_open_si
     np.testing.assert_allclose(found.deviation**2, (_RATE * far) ** 2 + _READING**2 + beyond**2, rtol=1e-9)
     bounded = replace(evidence, largest=1e-3)
     sure = _with_deviation(bounded, samples, None, MUG, "box", 0.0).deviation
-    open_side = (known == SUPPOSED) & (MUG.vertex_normals[:, 0] > 0.9)
+    open_side = (known == UNOBSERVED) & (MUG.vertex_normals[:, 0] > 0.9)
     assert (found.deviation[open_side] > 2.0 * sure[open_side]).all()
     touched_there = far < 1e-3
     assert sure[touched_there] == pytest.approx(_READING, rel=0.2)

@@ -25,10 +25,10 @@ from experiments.paper.train import main
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.explore.explorer import plan
 from experiments.shape_reconstruction.prior.network import (
+    NOMINAL_FRAME,
     SIDE,
-    UNTOUCHED,
+    CameraYaw,
     PointFrame,
-    Turned,
     window_of,
     window_points,
 )
@@ -94,7 +94,7 @@ def turned_about(evidence: ShapeEvidence, angle: float) -> ShapeEvidence:
     )
 
 
-def by_rays(frame: PointFrame, turned: Turned) -> BoolArray:
+def by_rays(frame: PointFrame, turned: CameraYaw) -> BoolArray:
     """``(SIDE, SIDE)``: where the window's rays meet the mug itself."""
     eye = turned.inward(LOOK.stand_from_camera[:3, 3][None])[0]
     ways = turned.outward(window_points(frame, eye) - eye)
@@ -104,8 +104,8 @@ def by_rays(frame: PointFrame, turned: Turned) -> BoolArray:
 
 @pytest.mark.parametrize("touched", [False, True])
 def test_a_window_shows_the_object_from_where_the_camera_is(touched: bool) -> None:
-    turned = Turned.towards(LOOK)
-    frame = frame_of(turned.inward(all_samples(BOTH).points)) if touched else UNTOUCHED
+    turned = CameraYaw.towards(LOOK)
+    frame = frame_of(turned.inward(all_samples(BOTH).points)) if touched else NOMINAL_FRAME
     filled = replace(LOOK, mask=np.asarray(binary_fill_holes(LOOK.mask)))
     found = window_of(filled, frame, turned)[0]
     wanted = by_rays(frame, turned)
@@ -118,7 +118,7 @@ def test_a_window_shows_the_object_from_where_the_camera_is(touched: bool) -> No
 
 def test_what_lies_beyond_the_picture_is_not_seen() -> None:
     narrow = replace(LOOK, mask=np.ones((4, 4), bool), hidden=np.zeros((4, 4), bool))
-    assert 0 < window_of(narrow, UNTOUCHED, Turned.towards(LOOK)).sum() < 40
+    assert 0 < window_of(narrow, NOMINAL_FRAME, CameraYaw.towards(LOOK)).sum() < 40
 
 
 @pytest.mark.parametrize("angle", [0.7, -2.5])

@@ -8,7 +8,7 @@ import trimesh
 
 from experiments.shape_reconstruction.family.estimate import fit_family
 from experiments.shape_reconstruction.family.settings import LEVELS
-from experiments.shape_reconstruction.prior.surface import by_glanced_surface
+from experiments.shape_reconstruction.prior.surface import predict_surface
 from experiments.shape_reconstruction.reconstruct import outline_error, predict_left_out
 from experiments.shape_reconstruction.smooth.bent_prior import bend_prior
 from experiments.shape_reconstruction.smooth.free_space import CLEARANCE, sensor_depth
@@ -66,7 +66,7 @@ def test_the_prior_is_bent_to_its_contacts_and_stays_in_the_free_space() -> None
     found = bend_prior(READINGS)
     mesh = found.mesh
     points = np.concatenate([touch.points for touch in TOUCHES])
-    before = NearestSurface(by_glanced_surface(READINGS).mesh).distances(points)
+    before = NearestSurface(predict_surface(READINGS).mesh).distances(points)
     after = NearestSurface(mesh).distances(points)
     assert np.sqrt(np.mean(after**2)) < 2.5e-3
     assert np.sqrt(np.mean(after**2)) < 0.6 * np.sqrt(np.mean(before**2))
@@ -85,7 +85,7 @@ def test_a_bent_prior_is_surest_where_it_was_touched_and_as_unsure_as_its_predic
     assert deviation.max() >= 0.95 * found.prediction_error
     alone = bend_prior(replace(READINGS, touches=TOUCHES[:1]))
     assert alone.left_out.shape == (1,)
-    prior = by_glanced_surface(READINGS)
+    prior = predict_surface(READINGS)
     assert alone.deviation.max() >= 0.95 * prior.deviation.max()
     # Without the one contact there is the prior alone.
     apart = NearestSurface(prior.mesh).distances(TOUCHES[0].points)

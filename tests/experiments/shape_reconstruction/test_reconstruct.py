@@ -13,9 +13,9 @@ from experiments.shape_reconstruction.family.kinds import draw_shape
 from experiments.shape_reconstruction.family.search import Hypothesis
 from experiments.shape_reconstruction.family.settings import CONTINUED, FamilySettings
 from experiments.shape_reconstruction.fits import FamilyFit, SmoothFit
-from experiments.shape_reconstruction.prior.network import shipped, with_supposed
+from experiments.shape_reconstruction.prior.network import shipped, with_prior_points
 from experiments.shape_reconstruction.reconstruct import reconstruct, reconstruct_with_prior
-from experiments.shape_reconstruction.smooth.hermite import by_hermite
+from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from experiments.shape_reconstruction.thresholds import (
     MAX_NUISANCE_COST,
@@ -33,7 +33,7 @@ from tests.support.shape_readings import look_at, shape_readings, touches_on
 
 MUG = build("mug")
 READINGS = shape_readings(touches_on(MUG, 12, seed=0), look_at(MUG))
-SMOOTH = by_hermite(READINGS, symmetric=False)
+SMOOTH = fit_rbf(READINGS, symmetric=False)
 
 
 def part(contacts: int, sighted: bool = True) -> ShapeEvidence:
@@ -154,14 +154,14 @@ def test_few_contacts_are_helped_by_the_prior(
 ) -> None:
     family = Family(monkeypatch, GOOD)
     reconstruct(part(contacts))
-    expected = with_supposed(READINGS).supposed if supposed else np.zeros((0, 3))
-    np.testing.assert_array_equal(family.given[0].supposed, expected)
+    expected = with_prior_points(READINGS).prior_points if supposed else np.zeros((0, 3))
+    np.testing.assert_array_equal(family.given[0].prior_points, expected)
 
 
 def test_the_prior_s_points_are_those_of_the_network_and_none_without_a_picture() -> None:
     assert READINGS.look is not None
-    np.testing.assert_array_equal(with_supposed(READINGS).supposed, shipped().points(READINGS.look))
-    assert len(with_supposed(part(1, sighted=False)).supposed) == 0
+    np.testing.assert_array_equal(with_prior_points(READINGS).prior_points, shipped().points(READINGS.look))
+    assert len(with_prior_points(part(1, sighted=False)).prior_points) == 0
 
 
 def test_without_a_contact_the_prior_answers_and_during_a_run_the_family(

@@ -10,7 +10,7 @@ from experiments.paper.shape_baselines import by_hull
 from experiments.paper.shape_retrieval import by_retrieval, household_library
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
 from experiments.shape_reconstruction.methods import Method, estimated
-from experiments.shape_reconstruction.smooth.hermite import by_hermite
+from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.surface import TOUCHED
 from experiments.shape_reconstruction.thresholds import ASSUMED_DEVIATION
 from harness.basics.geometry import rotation_about, transform, translation
@@ -22,7 +22,7 @@ MUG = build("mug")
 TOUCHES = touches_on(MUG, 3, seed=0)
 ONCE = shape_readings(TOUCHES, look_at(MUG))
 BY_TOUCH: Mapping[str, Method] = {
-    "rbf": by_hermite,
+    "rbf": fit_rbf,
     "hull": by_hull,
     "retrieval": lambda evidence: by_retrieval(evidence, household_library()),
 }

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from experiments.shape_reconstruction.metric import BAND90, BandHeld, band_held, surfaces_apart
-from experiments.shape_reconstruction.surface import SUPPOSED, ShapeEstimate
+from experiments.shape_reconstruction.surface import UNOBSERVED, ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
 
@@ -19,7 +19,7 @@ def held(factors: FloatArray, deviation: FloatArray | float) -> BandHeld:
     mesh = Mesh(TRUTH.vertices * np.reshape(factors, (-1, 1)), TRUTH.faces)
     count = len(mesh.vertices)
     stated = np.broadcast_to(np.asarray(deviation), count).copy()
-    estimate = ShapeEstimate(mesh, stated, np.full(count, SUPPOSED), (), {}, (), 0.0, "test")
+    estimate = ShapeEstimate(mesh, stated, np.full(count, UNOBSERVED), (), {}, (), 0.0, "test")
     return band_held(estimate, surfaces_apart(mesh, TRUTH, 3000))
 
 
@@ -49,7 +49,7 @@ def test_honest_normal_errors_are_held_nine_times_in_ten() -> None:
     moved = mesh.vertices * (1.0 + off[nearest] / RADIUS)[:, None]
     count = len(moved)
     estimate = ShapeEstimate(
-        Mesh(moved, mesh.faces), np.full(count, OFF), np.full(count, SUPPOSED), (), {}, (), 0.0, "test"
+        Mesh(moved, mesh.faces), np.full(count, OFF), np.full(count, UNOBSERVED), (), {}, (), 0.0, "test"
     )
     share = band_held(estimate, surfaces_apart(estimate.mesh, TRUTH, 4000)).answer
     assert share == pytest.approx(0.9, abs=0.05)

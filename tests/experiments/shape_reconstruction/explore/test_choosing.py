@@ -11,7 +11,7 @@ from experiments.shape_reconstruction.explore.choosing import (
     lines_at_surface,
     meeting_places,
 )
-from experiments.shape_reconstruction.surface import SUPPOSED, ShapeEstimate
+from experiments.shape_reconstruction.surface import UNOBSERVED, ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, transform, translation
 from harness.basics.mesh import Mesh
@@ -24,7 +24,7 @@ NOTHING = np.zeros((0, 3))
 
 
 def estimated(mesh: Mesh) -> ShapeEstimate:
-    known = np.full(len(mesh.vertices), SUPPOSED)
+    known = np.full(len(mesh.vertices), UNOBSERVED)
     return ShapeEstimate(mesh, np.full(len(mesh.vertices), 1e-3), known, (), {}, (), 0.0, "test")
 
 

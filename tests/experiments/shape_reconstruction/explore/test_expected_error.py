@@ -16,7 +16,7 @@ from experiments.shape_reconstruction.explore.choosing import (
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.kinds import draw_shape
-from experiments.shape_reconstruction.family.rays import first_met
+from experiments.shape_reconstruction.family.rays import first_hit
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh
@@ -140,7 +140,7 @@ def test_lines_meet_a_shape_where_its_surface_is(name: str) -> None:
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     starts = aims - 0.4 * ways
     rays = RayMesh(mesh).first_hits(starts, ways).distance
-    found = first_met(shape.code, shape.theta, starts, ways, 0.8)
+    found = first_hit(shape.code, shape.theta, starts, ways, 0.8)
     off = np.abs(found - rays)[np.isfinite(rays) & np.isfinite(found)]
     assert np.median(off) < 0.5e-3
     assert np.mean(np.isfinite(rays) == np.isfinite(found)) > 0.95  # but for those that graze it
@@ -149,9 +149,9 @@ def test_lines_meet_a_shape_where_its_surface_is(name: str) -> None:
 def test_a_line_that_ends_before_the_shape_meets_nothing() -> None:
     can = shape_at(0.0)
     start, way = np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, -1.0]])
-    far = first_met(can.code, can.theta, start, way, 1.0)[0]
-    assert first_met(can.code, can.theta, start, way, far - 2e-3)[0] == np.inf
-    assert first_met(can.code, can.theta, start, way, far + 1e-6)[0] == pytest.approx(far, abs=0.6e-3)
+    far = first_hit(can.code, can.theta, start, way, 1.0)[0]
+    assert first_hit(can.code, can.theta, start, way, far - 2e-3)[0] == np.inf
+    assert first_hit(can.code, can.theta, start, way, far + 1e-6)[0] == pytest.approx(far, abs=0.6e-3)
 
 
 def test_shapes_that_agree_leave_the_press_to_go_where_none_was() -> None:

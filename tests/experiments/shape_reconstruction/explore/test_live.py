@@ -17,7 +17,7 @@ from experiments.shape_reconstruction.explore.running import (
 )
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from experiments.shape_reconstruction.methods import QUICK
-from experiments.shape_reconstruction.smooth.hermite import by_hermite
+from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.objects.builtin import build
 from tests.experiments.shape_reconstruction.touched import evidence_of, presses
@@ -73,7 +73,7 @@ def test_each_estimate_is_given_that_of_a_press_less(monkeypatch: pytest.MonkeyP
         evidence: ShapeEvidence, _settings: FamilySettings, previous: ShapeEstimate | None
     ) -> ShapeEstimate:
         given.append(previous and previous.counts["presses"])
-        return replace(by_hermite(evidence_of(TOUCHES)), counts={"presses": len(evidence.touches)})
+        return replace(fit_rbf(evidence_of(TOUCHES)), counts={"presses": len(evidence.touches)})
 
     monkeypatch.setattr(running, "continued", continued)
     RunningShape(INFORMATIVE).after(evidence_of(TOUCHES[:3]))

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.shape_reconstruction.evidence import GuardedTouch
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.contact_fit import turned_contacts
+from experiments.shape_reconstruction.family.contact_fit import find_rotated_contacts
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.kinds import draw_shape
@@ -48,7 +48,7 @@ def turned(touch: GuardedTouch, angle: float, bearing: float = 0.5) -> GuardedTo
 
 
 def angles(shape: FamilyShape, touches: list[GuardedTouch]) -> FloatArray:
-    return turned_contacts(shape, shape_readings(tuple(touches), None))
+    return find_rotated_contacts(shape, shape_readings(tuple(touches), None))
 
 
 def touches_of(shape: FamilyShape) -> list[GuardedTouch]:

@@ -17,7 +17,7 @@ from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.fits import FamilyFit
 from experiments.shape_reconstruction.metric import shape_error
-from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
+from experiments.shape_reconstruction.surface import SEEN, TOUCHED, UNOBSERVED, ShapeEstimate
 from experiments.shape_reconstruction.thresholds import (
     BLIND_FACTOR,
     MAX_NUISANCE_COST,
@@ -57,7 +57,7 @@ def require_sound(found: ShapeEstimate) -> None:
     assert np.isfinite(found.deviation).all()
     assert (found.deviation > 0.0).all()
     assert found.known_by.shape == (count,)
-    assert set(np.unique(found.known_by)) <= {SUPPOSED, SEEN, TOUCHED}
+    assert set(np.unique(found.known_by)) <= {UNOBSERVED, SEEN, TOUCHED}
     edges = np.sort(found.mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
 

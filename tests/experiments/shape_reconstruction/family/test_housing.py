@@ -14,10 +14,10 @@ from experiments.shape_reconstruction.family.observed import HOUSING_FACTOR, MOD
 from experiments.shape_reconstruction.family.residuals import (
     active_rows,
     evaluate,
-    frozen,
+    fill_frozen,
     hold_rays,
-    prepared_room,
-    rows_for,
+    make_rows,
+    prepared_buffer,
 )
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing
@@ -39,7 +39,7 @@ def faces_around(middle: FloatArray, count: int, seed: int) -> list[FloatArray]:
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_nearest_place_of_a_face_is_that_of_all_its_places(name: str) -> None:
     shape = drawn(name)
-    q, place = prepared_room(), np.empty(3)
+    q, place = prepared_buffer(), np.empty(3)
     prepare(shape.code, shape.theta, q)
     share = np.linspace(-1.0, 1.0, 41)
     a, b = (one.reshape(-1, 1) for one in np.meshgrid(share, share))
@@ -55,8 +55,8 @@ def test_the_nearest_place_of_a_face_is_that_of_all_its_places(name: str) -> Non
 
 def housing_rows(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
     """``(faces,)`` in standard deviations."""
-    seen, q = observe(evidence), prepared_room()
-    out = rows_for(seen)
+    seen, q = observe(evidence), prepared_buffer()
+    out = make_rows(seen)
     evaluate(shape.code, shape.theta, seen, False, out, q)
     first = contact_row_count(seen)
     return out.values[first : first + len(seen.faces)].copy()
@@ -74,17 +74,17 @@ def test_a_shape_before_the_face_disagrees_as_one_within_it_does(name: str, gap:
     assert np.all(rows > 0.6 * gap - 0.1e-3 if gap > 0.0 else rows < 0.5e-3)
     kept_off = replace(evidence, touches=tuple(replace(one, stopped=False) for one in evidence.touches))
     seen, loose = observe(evidence), observe(kept_off)
-    q = prepared_room()
-    cost = evaluate(shape.code, shape.theta, seen, False, rows_for(seen), q)
-    without = evaluate(shape.code, shape.theta, loose, False, rows_for(loose), q)
+    q = prepared_buffer()
+    cost = evaluate(shape.code, shape.theta, seen, False, make_rows(seen), q)
+    without = evaluate(shape.code, shape.theta, loose, False, make_rows(loose), q)
     assert cost - without == pytest.approx(0.5 * np.sum((rows / sigma) ** 2))
 
 
 def test_a_face_that_nothing_is_near_costs_no_more_than_in_proportion() -> None:
     shape, evidence = ended_at("mug", 0.05)
     far = housing_rows(shape, evidence)
-    seen, q = observe(evidence), prepared_room()
-    out = rows_for(seen)
+    seen, q = observe(evidence), prepared_buffer()
+    out = make_rows(seen)
     evaluate(shape.code, shape.theta, seen, False, out, q)
     first = contact_row_count(seen)
     assert far.min() > 10.0
@@ -94,21 +94,21 @@ def test_a_face_that_nothing_is_near_costs_no_more_than_in_proportion() -> None:
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_face_is_held_where_it_is_met_and_moves_with_the_gel(name: str) -> None:
     shape, evidence = ended_at(name, 2e-3)
-    seen, q = observe(evidence), prepared_room()
+    seen, q = observe(evidence), prepared_buffer()
     theta = shape.theta.copy()
     theta[layout.GEL : layout.GEL + 3] = [0.4e-3, -0.3e-3, 0.6e-3]
-    out = rows_for(seen)
+    out = make_rows(seen)
     evaluate(shape.code, theta, seen, False, out, q)
     rows, first = active_rows(seen, out.values), contact_row_count(seen)
     faces = (rows >= first) & (rows < first + len(seen.faces))
     assert faces.sum() == 3
     base, moved = np.empty(len(rows)), np.empty(len(rows))
     hold_rays(shape.code, theta, seen, rows, out, q)
-    frozen(shape.code, theta, seen, rows, out, False, q, base)
+    fill_frozen(shape.code, theta, seen, rows, out, False, q, base)
     np.testing.assert_allclose(base[faces], out.values[rows][faces], atol=1e-9)
     deeper = theta.copy()
     deeper[layout.GEL + 2] += 0.2e-3
-    frozen(shape.code, deeper, seen, rows, out, False, q, moved)
+    fill_frozen(shape.code, deeper, seen, rows, out, False, q, moved)
     nearer = (base - moved)[faces] * seen.face_sigma
     assert np.all(nearer > 0.05e-3)  # the sensor is farther on, so that the shape is nearer
     assert np.all(nearer < 0.2e-3 + 1e-9)

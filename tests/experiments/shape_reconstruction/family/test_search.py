@@ -17,7 +17,7 @@ from experiments.shape_reconstruction.family.minimize import PriorRows, cheapest
 from experiments.shape_reconstruction.family.observed import PASS, FamilyEvidence, observe
 from experiments.shape_reconstruction.family.posterior import mixture_of
 from experiments.shape_reconstruction.family.proposals import guides_of, place_sample
-from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
+from experiments.shape_reconstruction.family.residuals import evaluate, make_rows, prepared_buffer
 from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.thresholds import SOLID_RARITY
@@ -28,7 +28,7 @@ from tests.support.shape_readings import missed, shape_readings
 
 
 def cost_of(shape: FamilyShape, seen: FamilyEvidence, robust: bool = True) -> float:
-    return float(evaluate(shape.code, shape.theta, seen, robust, rows_for(seen), prepared_room()))
+    return float(evaluate(shape.code, shape.theta, seen, robust, make_rows(seen), prepared_buffer()))
 
 
 def prior_of(shape: FamilyShape) -> PriorRows:
@@ -41,13 +41,13 @@ def prior_of(shape: FamilyShape) -> PriorRows:
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_shape_that_costs_more_than_is_asked_for_is_left_and_no_other(name: str) -> None:
     shape, evidence = made(name)
-    seen, q, prior = observe(evidence), prepared_room(), prior_of(shape)
+    seen, q, prior = observe(evidence), prepared_buffer(), prior_of(shape)
     tried = np.array([nudged(shape, 0.2, seed) for seed in range(6)])
-    costs = [total_cost(shape.code, one, seen, prior, False, rows_for(seen), q) for one in tried]
-    best, least = cheapest(shape.code, tried, seen, prior, rows_for(seen), q)
+    costs = [total_cost(shape.code, one, seen, prior, False, make_rows(seen), q) for one in tried]
+    best, least = cheapest(shape.code, tried, seen, prior, make_rows(seen), q)
     assert (best, least) == (int(np.argmin(costs)), min(costs))
     for one in tried:
-        whole, out = rows_for(seen), rows_for(seen)
+        whole, out = make_rows(seen), make_rows(seen)
         cost = evaluate(shape.code, one, seen, False, whole, q)
         assert evaluate(shape.code, one, seen, False, out, q, (1.0 + 1e-9) * cost) == cost
         assert np.array_equal(out.values, whole.values)
@@ -105,7 +105,7 @@ def test_refining_never_costs_more_and_finds_the_way_back(name: str) -> None:
     seen, prior = observe(evidence), prior_of(shape)
     theta = nudged(shape, 0.15)
     basis = basis_of(shape.code, True, True)
-    before = total_cost(shape.code, theta, seen, prior, False, rows_for(seen), prepared_room())
+    before = total_cost(shape.code, theta, seen, prior, False, make_rows(seen), prepared_buffer())
     costs = [before]
     for rounds in (2, 12):
         found, cost, curvature = minimize(shape.code, theta, seen, prior, basis, False, rounds)
@@ -169,8 +169,8 @@ def test_a_thin_board_far_outside_of_the_mask_is_wrong_by_more_than_it_is_thick(
     seen = observe(replace(readings, touches=()))
     board = draw_shape("board", np.random.default_rng(0))
     board.theta[revolution.SLOT.height], board.theta[layout.X] = np.log(0.06), 0.12
-    out = rows_for(seen)
-    evaluate(board.code, board.theta, seen, False, out, prepared_room())
+    out = make_rows(seen)
+    evaluate(board.code, board.theta, seen, False, out, prepared_buffer())
     passing = out.values[-len(seen.rays.kinds) :][seen.rays.kinds == PASS]
     met = passing[passing < 0.0]
     thick = np.exp(board.theta[revolution.SLOT.radii[0]])

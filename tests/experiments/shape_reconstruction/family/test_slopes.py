@@ -17,12 +17,12 @@ from experiments.shape_reconstruction.family.residuals import (
     NUDGE,
     active_rows,
     evaluate,
+    fill_frozen,
+    first_prior_row,
     first_ray,
-    first_supposed,
-    frozen,
     hold_rays,
-    prepared_room,
-    rows_for,
+    make_rows,
+    prepared_buffer,
     slopes_along,
 )
 from tests.support.family_readings import ended_at, made, nudged
@@ -35,14 +35,14 @@ def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: s
     # Places said to be clear that lie in the shape, some of them, pull too.
     touches = tuple(replace(one, clear=one.points - 6e-3 * one.normals) for one in evidence.touches)
     supposed = np.concatenate([one.points + 2e-3 for one in touches])
-    seen = observe(replace(evidence, touches=touches, supposed=supposed))
+    seen = observe(replace(evidence, touches=touches, prior_points=supposed))
     theta = nudged(shape, 0.05)
-    out, q = rows_for(seen), prepared_room()
+    out, q = make_rows(seen), prepared_buffer()
     evaluate(shape.code, theta, seen, False, out, q)
     rows = active_rows(seen, out.values)
     base, moved = np.empty(len(rows)), np.empty(len(rows))
     hold_rays(shape.code, theta, seen, rows, out, q)
-    frozen(shape.code, theta, seen, rows, out, False, q, base)
+    fill_frozen(shape.code, theta, seen, rows, out, False, q, base)
     first = contact_row_count(seen) + len(seen.free)
     seen_by_rays = (rows >= first) & (rows < first + len(seen.rays.kinds))
     np.testing.assert_allclose(base[~seen_by_rays], out.values[rows][~seen_by_rays], atol=1e-9)
@@ -50,13 +50,13 @@ def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: s
     assert np.all(base[seen_by_rays] < out.values[rows][seen_by_rays] + 0.15)
     direction = np.zeros(len(theta))
     direction[layout.X] = 0.5e-3  # far beyond what a ray searched anew may be off
-    frozen(shape.code, theta + direction, seen, rows, out, False, q, moved)
-    again = rows_for(seen)
+    fill_frozen(shape.code, theta + direction, seen, rows, out, False, q, moved)
+    again = make_rows(seen)
     evaluate(shape.code, theta + direction, seen, False, again, q)
-    contacts, count = rows < contact_row_count(seen), len(seen.supposed)
+    contacts, count = rows < contact_row_count(seen), len(seen.prior_points)
     assert (rows[contacts] >= len(seen.points) + 3 * len(seen.middles)).any()
     assert np.array_equal(again.values[rows][contacts], moved[contacts])
-    assert 0 < count == np.sum(rows >= len(rows_for(seen).values) - count)
+    assert 0 < count == np.sum(rows >= len(make_rows(seen).values) - count)
     assert np.array_equal(again.values[-count:], moved[-count:])
     rows, contacts, base, moved = rows[:-count], contacts[:-count], base[:-count], moved[:-count]
     # Along a flat side a ray's nearest place jumps as the shape moves: held there, it is off by that.
@@ -71,22 +71,22 @@ def test_the_slope_along_every_direction_is_that_of_its_rows(name: str) -> None:
     # Places said to be clear that lie in the shape, some of them, pull too.
     touches = tuple(replace(one, clear=one.points - 4e-3 * one.normals) for one in evidence.touches)
     supposed = np.concatenate([one.points + 2e-3 for one in touches])
-    seen = observe(replace(evidence, touches=touches, supposed=supposed))
+    seen = observe(replace(evidence, touches=touches, prior_points=supposed))
     theta = nudged(shape, 0.05)
     assert np.all(theta[[layout.CAMERA_RIGHT, layout.CAMERA_SCALE, layout.GEL, layout.TILT_X]] != 0.0)
-    out, q = rows_for(seen), prepared_room()
+    out, q = make_rows(seen), prepared_buffer()
     evaluate(shape.code, theta, seen, False, out, q)
     rows = active_rows(seen, out.values)
     every = basis_of(shape.code, True, True)
     basis = np.concatenate([every, stand_basis(shape.code, True), every[:1] + every[-1:]])
     slopes = slopes_along(shape.code, theta, seen, basis, rows, out, q)
     base, moved = np.empty(len(rows)), np.empty(len(rows))
-    frozen(shape.code, theta, seen, rows, out, False, q, base)
-    ends = (contact_row_count(seen), first_ray(seen), first_supposed(seen), len(rows_for(seen).values))
+    fill_frozen(shape.code, theta, seen, rows, out, False, q, base)
+    ends = (contact_row_count(seen), first_ray(seen), first_prior_row(seen), len(make_rows(seen).values))
     kinds = np.searchsorted(ends, rows, side="right")
     assert set(kinds) == {0, 1, 2, 3}
     for direction, slope in zip(basis, slopes, strict=True):
-        frozen(shape.code, theta + NUDGE * direction, seen, rows, out, False, q, moved)
+        fill_frozen(shape.code, theta + NUDGE * direction, seen, rows, out, False, q, moved)
         true = (moved - base) / NUDGE
         for kind in range(len(ends)):
             found, asked = slope[kinds == kind], true[kinds == kind]

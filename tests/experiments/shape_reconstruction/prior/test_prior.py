@@ -11,13 +11,13 @@ import trimesh
 from experiments.shape_reconstruction.methods import estimated
 from experiments.shape_reconstruction.metric import surfaces_apart
 from experiments.shape_reconstruction.prior.network import (
-    GIVEN,
+    POINTS_GIVEN,
     SIDE,
     opened,
+    require_silhouette,
     shipped,
-    silhouette_to_glance_at,
 )
-from experiments.shape_reconstruction.prior.surface import PITCH, by_glanced_surface, closed_around
+from experiments.shape_reconstruction.prior.surface import PITCH, closed_around, predict_surface
 from experiments.shape_reconstruction.prior.train import main
 from harness.basics.errors import DataRefused, FitRefused
 from harness.basics.faces.mesh_rays import is_inside
@@ -33,7 +33,7 @@ UP = np.array([0.0, 0.0, 1.0])
 def test_one_look_is_nearer_than_a_centimetre_to_what_was_never_drawn(name: str) -> None:
     mesh = build(name, 6e-3)
     seen = evidence_of((), look_at(mesh))
-    found = by_glanced_surface(seen)
+    found = predict_surface(seen)
     assert surfaces_apart(found.mesh, mesh, 3000).error.chamfer < 10e-3
     body = trimesh.Trimesh(found.mesh.vertices, found.mesh.faces)
     assert body.is_watertight
@@ -58,7 +58,7 @@ def test_what_is_too_large_for_the_network_is_not_glanced_at() -> None:
     large = Mesh(2.5 * large.vertices, large.faces)
     seen = evidence_of((), look_at(large), largest=0.8)
     with pytest.raises(FitRefused, match="200 mm"):
-        by_glanced_surface(seen)
+        predict_surface(seen)
     assert estimated("family", seen).estimator != "glance"
 
 
@@ -77,10 +77,10 @@ def test_closing_fills_a_ball_and_leaves_a_bowl_open() -> None:
 
 def test_a_silhouette_that_it_does_not_understand_makes_it_less_sure() -> None:
     look = look_at(build("mug", 6e-3))
-    known = by_glanced_surface(evidence_of((), look))
+    known = predict_surface(evidence_of((), look))
     odd = look.mask.copy()
     odd[30:90:6] = False  # no household shape is in slices
-    strange = by_glanced_surface(evidence_of((), replace(look, mask=odd)))
+    strange = predict_surface(evidence_of((), replace(look, mask=odd)))
     assert strange.deviation.min() > known.deviation.max()
 
 
@@ -96,7 +96,7 @@ def test_without_a_silhouette_there_is_no_glance() -> None:
     look = look_at(build("mug", 6e-3))
     for nothing in (None, replace(look, mask=np.zeros_like(look.mask))):
         with pytest.raises(FitRefused, match="camera"):
-            silhouette_to_glance_at(evidence_of((), nothing))
+            require_silhouette(evidence_of((), nothing))
     with pytest.raises(FitRefused):
         estimated("glance", evidence_of((), None))
 
@@ -124,7 +124,7 @@ def test_what_another_program_trains_is_refused_by_name(
 
 def test_a_smoke_training_ends_in_a_graph_that_answers_as_torch_does(tmp_path: Path) -> None:
     torch = pytest.importorskip("torch", reason="the extra 'author' is not installed")
-    from experiments.shape_reconstruction.prior.training import GlanceNetwork
+    from experiments.shape_reconstruction.prior.training import PriorNetwork
 
     asked = ["--profile", "smoke", "--only", "glance", "--processes", "1", "--device", "cpu"]
     assert main([*asked, "--out", str(tmp_path)]) == 0
@@ -134,11 +134,11 @@ def test_a_smoke_training_ends_in_a_graph_that_answers_as_torch_does(tmp_path: P
         opened((tmp_path / "glance.onnx").read_bytes(), card).points(look_at(build("mug", 9e-3)))
     ).all()
     torch.manual_seed(1)
-    module = GlanceNetwork()
+    module = PriorNetwork()
     windows = (torch.rand((3, 1, SIDE, SIDE)) < 0.4).to(torch.float32)
     with torch.no_grad():
         module.train()(windows)  # so that the normalisation is of something
         wanted = module.eval()(windows)[1].numpy()
     answered = opened(module.graph(), card).network({"window": windows.numpy()})["completed"]
-    assert answered.shape == (3, GIVEN, 3)
+    assert answered.shape == (3, POINTS_GIVEN, 3)
     assert answered == pytest.approx(wanted, abs=1e-2 * float(np.abs(wanted).max()))  # half precision

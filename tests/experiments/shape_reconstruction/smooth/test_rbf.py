@@ -10,9 +10,9 @@ from experiments.shape_reconstruction.evidence import GuardedTouch
 from experiments.shape_reconstruction.metric import shape_error
 from experiments.shape_reconstruction.smooth.contact_samples import all_samples, thinned
 from experiments.shape_reconstruction.smooth.free_space import CLEARANCE, Silhouette, sensor_depth
-from experiments.shape_reconstruction.smooth.hermite import by_hermite
+from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.smooth.revolution import find_revolution
-from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
+from experiments.shape_reconstruction.surface import SEEN, TOUCHED, UNOBSERVED, ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import apply, inverse, rotation_about, transform
@@ -35,7 +35,7 @@ def require_whole(estimate: ShapeEstimate) -> None:
     assert np.isfinite(estimate.deviation).all()
     assert (estimate.deviation > 0.0).all()
     assert len(estimate.deviation) == len(estimate.known_by) == len(mesh.vertices)
-    assert set(np.unique(estimate.known_by)) <= {SUPPOSED, SEEN, TOUCHED}
+    assert set(np.unique(estimate.known_by)) <= {UNOBSERVED, SEEN, TOUCHED}
 
 
 def moved(touch: GuardedTouch, pose: FloatArray) -> GuardedTouch:
@@ -50,11 +50,11 @@ def moved(touch: GuardedTouch, pose: FloatArray) -> GuardedTouch:
 @pytest.mark.parametrize("count", [1, 4, 32])
 @pytest.mark.parametrize("seen", [False, True])
 def test_every_answer_is_a_closed_body_that_says_how_well_it_is_known(count: int, seen: bool) -> None:
-    require_whole(by_hermite(evidence_of(TOUCHES[:count], LOOK if seen else None)))
+    require_whole(fit_rbf(evidence_of(TOUCHES[:count], LOOK if seen else None)))
 
 
 def test_more_contacts_are_better_and_touched_places_are_known_best() -> None:
-    few, many = by_hermite(evidence_of(TOUCHES[:6])), by_hermite(evidence_of(TOUCHES))
+    few, many = fit_rbf(evidence_of(TOUCHES[:6])), fit_rbf(evidence_of(TOUCHES))
     errors = [shape_error(one.mesh, MUG, samples=4000).chamfer for one in (few, many)]
     assert errors[1] < errors[0]
     touched = many.known_by == TOUCHED
@@ -65,19 +65,19 @@ def test_more_contacts_are_better_and_touched_places_are_known_best() -> None:
 def test_the_answer_turns_and_moves_with_the_readings() -> None:
     pose = transform(rotation_about(np.array([0.0, 0.0, 1.0]), 0.7), np.array([0.02, -0.01, 0.0]))
     turned = evidence_of(tuple(moved(touch, pose) for touch in TOUCHES))
-    one, other = by_hermite(evidence_of(TOUCHES)), by_hermite(turned)
+    one, other = fit_rbf(evidence_of(TOUCHES)), fit_rbf(turned)
     back = Mesh(apply(inverse(pose), other.mesh.vertices), other.mesh.faces)
     assert shape_error(one.mesh, back, samples=3000).chamfer < 1.5e-3  # a fraction of the grid's pitch
 
 
 def test_the_order_of_touches_changes_little_and_single_precision_nothing() -> None:
-    one = by_hermite(BOTH).mesh
-    again = by_hermite(replace(BOTH, touches=TOUCHES[::-1])).mesh
+    one = fit_rbf(BOTH).mesh
+    again = fit_rbf(replace(BOTH, touches=TOUCHES[::-1])).mesh
     assert shape_error(one, again, samples=3000).chamfer < 1.0e-3
     rounded = tuple(
         replace(touch, points=touch.points.astype(np.float32).astype(np.float64)) for touch in TOUCHES
     )
-    same = by_hermite(replace(BOTH, touches=rounded)).mesh
+    same = fit_rbf(replace(BOTH, touches=rounded)).mesh
     assert shape_error(one, same, samples=3000).chamfer < 0.2e-3
 
 
@@ -86,30 +86,30 @@ def test_nothing_of_the_answer_is_where_the_sensor_was_or_beside_the_silhouette(
     pose = transform(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 0.05]))
     missed = replace(missed, stand_from_gel=pose, points=np.zeros((0, 3)), normals=np.zeros((0, 3)))
     evidence = replace(BOTH, touches=(*TOUCHES, missed))
-    mesh = by_hermite(evidence).mesh
+    mesh = fit_rbf(evidence).mesh
     assert float(sensor_depth(evidence, mesh.vertices).max()) < CLEARANCE + 2.0e-3
     silhouette = Silhouette.of(LOOK, all_samples(evidence).points)
     assert float(silhouette.outside_metres(mesh.vertices).max()) < 3.5e-3
 
 
 def test_presses_all_in_one_place_bound_nothing_and_say_so() -> None:
-    answer = by_hermite(evidence_of(tuple(replace(TOUCHES[0], index=k) for k in range(6))))
+    answer = fit_rbf(evidence_of(tuple(replace(TOUCHES[0], index=k) for k in range(6))))
     require_whole(answer)
     assert len(answer.not_bounded) >= 2
-    supposed = answer.known_by == SUPPOSED
+    supposed = answer.known_by == UNOBSERVED
     assert float(answer.deviation[supposed].max()) > 0.03
-    assert by_hermite(evidence_of(TOUCHES)).not_bounded == ()
+    assert fit_rbf(evidence_of(TOUCHES)).not_bounded == ()
 
 
 def test_a_blank_picture_is_no_picture() -> None:
     blank = replace(LOOK, mask=np.zeros_like(LOOK.mask))
-    with_it, without = by_hermite(evidence_of(TOUCHES[:8], blank)), by_hermite(evidence_of(TOUCHES[:8]))
+    with_it, without = fit_rbf(evidence_of(TOUCHES[:8], blank)), fit_rbf(evidence_of(TOUCHES[:8]))
     assert with_it.mesh.vertices == pytest.approx(without.mesh.vertices)
 
 
 def test_without_a_contact_there_is_no_answer_by_touch() -> None:
     with pytest.raises(FitRefused, match="0 touches"):
-        by_hermite(evidence_of((), LOOK))
+        fit_rbf(evidence_of((), LOOK))
 
 
 def test_a_slipped_contact_is_named_with_about_how_far_it_is_off() -> None:
@@ -117,7 +117,7 @@ def test_a_slipped_contact_is_named_with_about_how_far_it_is_off() -> None:
     normal = slip.normals.mean(axis=0)
     wrong = replace(slip, points=slip.points - 0.012 * normal / np.linalg.norm(normal))
     dense = presses(MUG, 60, seed=11)
-    answer = by_hermite(evidence_of((*dense, replace(wrong, index=77))))
+    answer = fit_rbf(evidence_of((*dense, replace(wrong, index=77))))
     assert answer.doubtful.get(77, 0.0) > 6e-3
 
 
@@ -160,17 +160,17 @@ def test_a_round_body_s_axis_brings_its_surface_to_where_nothing_was_touched() -
     found = find_revolution(thinned(all_samples(evidence)))
     assert found is not None
     assert np.abs(found.centre - middle[:2]).max() < 6e-3
-    with_axis, without = (shape_error(by_hermite(evidence, each).mesh, body) for each in (True, False))
+    with_axis, without = (shape_error(fit_rbf(evidence, each).mesh, body) for each in (True, False))
     assert with_axis.completeness < 0.6 * without.completeness
 
 
 def test_a_top_that_nobody_touched_may_be_a_mouth_and_is_not_sure() -> None:
     bowl = build("bowl", 6e-3)
     outside = tuple(touch for touch in presses(bowl, 60, seed=2) if touch.normals[:, 2].mean() < 0.3)
-    answer = by_hermite(evidence_of(outside))
+    answer = fit_rbf(evidence_of(outside))
     assert any("hollow" in flag for flag in answer.flags)
     top = (answer.mesh.vertex_normals[:, 2] > 0.8) & (answer.mesh.vertices[:, 2] > 0.04)
     assert float(np.median(answer.deviation[top])) > 0.02
     made = trimesh.creation.box((0.07, 0.07, 0.06)).subdivide().subdivide()
     block = Mesh(made.vertices + np.array([0.0, 0.0, 0.03]), made.faces)
-    assert by_hermite(evidence_of(presses(block, 60, seed=2))).flags == ()
+    assert fit_rbf(evidence_of(presses(block, 60, seed=2))).flags == ()

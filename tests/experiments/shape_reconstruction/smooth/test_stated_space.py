@@ -11,7 +11,7 @@ from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import estimate as family
 from experiments.shape_reconstruction.family.settings import CONTINUED
 from experiments.shape_reconstruction.methods import METHODS, continued, estimated
-from experiments.shape_reconstruction.smooth.hermite import by_hermite
+from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.smooth.stated_space import longest_side, max_offset
 from experiments.shape_reconstruction.thresholds import MAX_LENGTH_RATIO
 from harness.basics.arrays import FloatArray
@@ -82,7 +82,7 @@ def test_contacts_away_from_the_stated_place_or_too_far_apart_are_refused() -> N
 def test_an_answer_longer_than_stated_is_refused(
     monkeypatch: pytest.MonkeyPatch, factor: float, refused: bool
 ) -> None:
-    small = by_hermite(TOUCHED)
+    small = fit_rbf(TOUCHED)
     size = factor * MAX_LENGTH_RATIO * TOUCHED.largest / longest_side(small.mesh.vertices)
     grown = replace(small, mesh=Mesh(size * small.mesh.vertices, small.mesh.faces))
     box = {"box": lambda _: grown}

@@ -8,8 +8,8 @@ import pytest
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples
 from experiments.shape_reconstruction.smooth.free_space import sensor_depth
-from experiments.shape_reconstruction.smooth.hermite import by_hermite
-from experiments.shape_reconstruction.smooth.revolution import SLACK, Revolution, turned_room
+from experiments.shape_reconstruction.smooth.hermite import fit_rbf
+from experiments.shape_reconstruction.smooth.revolution import SLACK, Revolution, rotated_space
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.mesh_rays import is_inside
 from tests.experiments.shape_reconstruction.touched import evidence_of, touch_of
@@ -51,7 +51,7 @@ def circle(radius: float, z: float) -> FloatArray:
 def test_room_is_as_free_as_the_sensor_left_it_and_the_same_all_around() -> None:
     evidence = vessel()
     samples = all_samples(evidence)
-    room = turned_room(axis_of(samples), samples, evidence)
+    room = rotated_space(axis_of(samples), samples, evidence)
     assert room is not None
     places = circle(0.03, 0.06)
     assert np.ptp(room.at(places)) < 1e-9
@@ -65,14 +65,14 @@ def test_a_touch_whose_turned_room_would_hold_a_place_that_was_met_is_left_out()
     evidence = vessel()
     column = patch(np.array([-0.02, 0.0, 0.07]), UP, 99)  # stands on the floor, to one side
     samples = all_samples(replace(evidence, touches=(*evidence.touches, column)))
-    assert turned_room(axis_of(samples), samples, evidence) is None
+    assert rotated_space(axis_of(samples), samples, evidence) is None
 
 
 def test_without_a_touch_down_into_it_a_round_body_has_no_room() -> None:
     evidence = vessel()
     part = replace(evidence, touches=evidence.touches[:-1])
     samples = all_samples(part)
-    assert turned_room(axis_of(samples), samples, part) is None
+    assert rotated_space(axis_of(samples), samples, part) is None
 
 
 @pytest.mark.parametrize("last", ["met", "missed", "not made"])
@@ -81,7 +81,7 @@ def test_the_smooth_surface_of_a_vessel_is_open_where_a_touch_went_down_into_it(
     *others, down = evidence.touches
     nothing = replace(down, points=np.zeros((0, 3)), normals=np.zeros((0, 3)))
     ends = {"met": [down], "missed": [nothing], "not made": []}[last]
-    found = by_hermite(replace(evidence, touches=(*others, *ends)))
+    found = fit_rbf(replace(evidence, touches=(*others, *ends)))
     assert found.details()["axis_m"] == pytest.approx(CENTRE[:2], abs=1e-3)
     inside = is_inside(circle(0.03, 0.06)[:-1], found.mesh.corners)
     assert not inside.any() if hollow else inside.all()
