@@ -21,17 +21,11 @@ SENSES = ("vision", "touch", "fused")
 class ShapeAnswer:
     """What a run says of a shape."""
 
-    evidence: ShapeEvidence  #: that it is made of.
+    evidence: ShapeEvidence  #: all readings.
+    fused: ShapeEstimate  #: the surface from all readings.
     by_sense: Mapping[str, ShapeEstimate | FitRefused]
-    """the surface by each sense that the scene asks for and by all, or why there is none."""
+    """the surface from each sense that the scene asks for, and the fused one; or why there is none."""
     seconds: Mapping[str, float]  #: s of each, the reading of its steps included.
-
-    @property
-    def fused(self) -> ShapeEstimate:
-        """By all readings; there is none without it."""
-        found = self.by_sense["fused"]
-        assert not isinstance(found, FitRefused)
-        return found
 
 
 @dataclass(eq=False)
@@ -81,10 +75,10 @@ class ShapeAnswering:
         else:
             found["fused"], took = self._tried(evidence)
             seconds["fused"] = sum(self._read.values()) + took
-        refusal = found["fused"]
-        if isinstance(refusal, FitRefused):
-            raise refusal
-        return ShapeAnswer(evidence, found, seconds)
+        fused = found["fused"]
+        if isinstance(fused, FitRefused):
+            raise fused
+        return ShapeAnswer(evidence, fused, found, seconds)
 
     def _given(self, evidence: ShapeEvidence) -> dict[str, ShapeEvidence]:
         """What each sense that the scene asks for has read."""

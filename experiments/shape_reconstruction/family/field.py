@@ -78,7 +78,7 @@ def median_surface(mixture: Mixture, pitch: float, contacts: FloatArray | None =
 
 def _wall(shape: FamilyShape) -> float:
     """M of a hollow body's wall and floor, the thinner; infinite of any other, which has none."""
-    walls = list(kind_of(shape.code).walls(shape.code))
+    walls = list(kind_of(shape.code).traits(shape.code).walls)
     return float(np.exp(shape.theta[walls].min())) if walls else np.inf
 
 
@@ -86,7 +86,7 @@ def _thickened(shape: FamilyShape, least: float) -> FamilyShape:
     """The same, its wall and floor at least so many m thick; its outside as it was."""
     if _wall(shape) >= least:
         return shape
-    theta, walls = shape.theta.copy(), list(kind_of(shape.code).walls(shape.code))
+    theta, walls = shape.theta.copy(), list(kind_of(shape.code).traits(shape.code).walls)
     theta[walls] = np.maximum(theta[walls], np.log(least))
     return FamilyShape(shape.name, shape.code, theta)
 

@@ -50,7 +50,7 @@ def basis_of(code: IntArray, sighted: bool, touched: bool) -> FloatArray:
     """Return ``(n, size)`` directions: every free number by itself."""
     kind = kind_of(code)
     slots = [layout.X, layout.Y, layout.LIFT, layout.TILT_X, layout.TILT_Y, *kind.deviations(code)]
-    if kind.has_yaw(code):
+    if kind.traits(code).has_yaw:
         slots.append(layout.YAW)
     if sighted:
         slots += [layout.CAMERA_RIGHT, layout.CAMERA_DOWN, layout.CAMERA_SCALE, layout.OUTLINE]
@@ -68,9 +68,9 @@ def stand_basis(code: IntArray, two_senses: bool) -> FloatArray:
     kind = kind_of(code)
     rows: list[tuple[int, ...]] = [(layout.CAMERA_RIGHT,), (layout.CAMERA_DOWN,)] if two_senses else []
     rows += [(layout.X,), (layout.Y,), kind.lengths, (kind.height,)]
-    if kind.has_yaw(code):
+    if kind.traits(code).has_yaw:
         rows.append((layout.YAW,))
-    rows += [(slot,) for slot in kind.proportions(code)]
+    rows += [(slot,) for slot in kind.traits(code).proportions]
     return np.array([_along(kind.size, *slots) for slots in rows])
 
 
@@ -117,7 +117,7 @@ def stand_rows(code: IntArray) -> FloatArray:
     kind = kind_of(code)
     width, height = _along(kind.size, kind.width), _along(kind.size, kind.height)
     rows = [width / 0.4, (height - width) / 0.25]
-    rows += [(_along(kind.size, slot) - width) / 0.3 for slot in kind.proportions(code)]
+    rows += [(_along(kind.size, slot) - width) / 0.3 for slot in kind.traits(code).proportions]
     return np.array(rows)
 
 

@@ -39,6 +39,17 @@ Draw = Callable[[Random, IntArray, FloatArray], None]
 """Fills the code and the vector of a sample of a class, at the origin."""
 
 
+@dataclass(frozen=True)
+class Traits:
+    """What the parts of a shape imply. Slots are indices into its vector."""
+
+    has_yaw: bool = True  #: whether a rotation about the vertical changes it.
+    yaw_factor: int = 1  #: factor on the number of yaws that a sample is tried at.
+    proportions: tuple[int, ...] = ()  #: slots that are fitted on their own while a sample is placed.
+    walls: tuple[int, ...] = ()  #: slots of the thicknesses of walls around a cavity.
+    has_sides: bool = False  #: whether it has straight sides, which ``set_sides`` sets.
+
+
 class ShapeKind(ABC):
     """A kind of shape. Slots are indices into a shape's vector."""
 
@@ -63,21 +74,9 @@ class ShapeKind(ABC):
         """Yield shapes with one part added, removed or exchanged."""
         return iter(())
 
-    def proportions(self, _code: IntArray) -> tuple[int, ...]:
-        """Return slots that are fitted on their own while a sample is placed."""
-        return ()
-
-    def has_yaw(self, _code: IntArray) -> bool:
-        """Whether a rotation about the vertical changes the shape."""
-        return True
-
-    def yaws(self, _code: IntArray, count: int) -> int:
-        """Return the number of yaws that a sample is tried at, of ``count`` for a simple shape."""
-        return count
-
-    def walls(self, _code: IntArray) -> tuple[int, ...]:
-        """Return slots of the thicknesses of walls around a cavity."""
-        return ()
+    def traits(self, _code: IntArray) -> Traits:
+        """Return what the parts of a shape imply."""
+        return Traits()
 
     def rarity(self, _code: IntArray, _theta: FloatArray, _agrees: bool) -> float:
         """Compute the natural logarithm of the rarity of a shape by its parts and proportions.
@@ -85,10 +84,6 @@ class ShapeKind(ABC):
         ``_agrees`` states whether all samples of its class are hollow, or solid, as it is.
         """
         return 0.0
-
-    def has_sides(self, _code: IntArray) -> bool:
-        """Whether the body has straight sides that ``set_sides`` sets."""
-        return False
 
     def set_sides(self, theta: FloatArray, half: FloatArray) -> None:
         """Set ``(2,)`` half sides of a body with straight ones, m."""

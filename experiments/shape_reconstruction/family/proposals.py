@@ -80,7 +80,7 @@ def place_sample(
         turn = 0.0 if found is None else found
     theta[list(kind.lengths)] += _log_scale(shape, guides, random, turn)
     theta[layout.X : layout.Y + 1] = _middle(shape, theta, guides, random, place_error)
-    count = yaws if kind.has_yaw(shape.code) else 1
+    count = yaws if kind.traits(shape.code).has_yaw else 1
     placed = np.repeat(theta[None], count, axis=0)
     # Yaws that the readings propose and their opposites, then any, evenly spread.
     turns = random.uniform(0.0, 2.0 * np.pi) + 2.0 * np.pi * np.arange(count) / count
@@ -91,7 +91,7 @@ def place_sample(
         few = (count + 1) // 3
         turns[:few] = random.choice(guides.turns, few) + 0.5 * np.pi * random.integers(0, 4, few)
     placed[:, layout.YAW] = turns
-    if kind.has_sides(shape.code) and len(guides.places) >= ENOUGH and random.random() < SPANNED:
+    if kind.traits(shape.code).has_sides and len(guides.places) >= ENOUGH and random.random() < SPANNED:
         # A body with straight sides has the sides and the middle of the contacts' box, as it is turned.
         for one in placed:
             cosine, sine = np.cos(one[layout.YAW]), np.sin(one[layout.YAW])
@@ -233,7 +233,7 @@ along x and y, m; of its yaw, rad."""
 def change(shape: FamilyShape, random: Random) -> Iterator[FamilyShape]:
     """Yield shapes that differ from one by one part or by a rotation."""
     kind = kind_of(shape.code)
-    if kind.has_yaw(shape.code):
+    if kind.traits(shape.code).has_yaw:
         yield shape.rotate(np.pi)
     yield from kind.changes(shape, random)
 
@@ -245,6 +245,6 @@ def perturb(shape: FamilyShape, random: Random) -> FamilyShape:
     for slot, sigma in kind.deviations(shape.code).items():
         theta[slot] += PERTURBATION * sigma * random.standard_normal()
     theta[layout.X : layout.Y + 1] += PERTURBATION_PLACE * random.standard_normal(2)
-    if kind.has_yaw(shape.code):
+    if kind.traits(shape.code).has_yaw:
         theta[layout.YAW] += PERTURBATION_YAW * random.standard_normal()
     return FamilyShape(shape.name, shape.code, theta)

@@ -6,7 +6,14 @@ from types import MappingProxyType
 import numpy as np
 
 from experiments.shape_reconstruction import thresholds as limits
-from experiments.shape_reconstruction.family.kind import MM, FamilyShape, Random, ShapeKind, sample_length
+from experiments.shape_reconstruction.family.kind import (
+    MM,
+    FamilyShape,
+    Random,
+    ShapeKind,
+    Traits,
+    sample_length,
+)
 from experiments.shape_reconstruction.family.layout import REVOLUTION
 from experiments.shape_reconstruction.family.revolution_distance import (
     BAR,
@@ -309,22 +316,19 @@ class BodyOfRevolution(ShapeKind):
             half += 0.35 * float(np.exp(theta[SLOT.limb_reach]))
         return half, float(np.exp(theta[SLOT.height]))
 
-    def proportions(self, code: IntArray) -> tuple[int, ...]:
-        """Return slots that are fitted on their own while a sample is placed."""
-        core = (SLOT.core_x, SLOT.core_y) if code[PLAN] == CORED else ()
-        return (*core, SLOT.limb_reach) if code[LIMB] == BAR else core
-
-    def has_yaw(self, code: IntArray) -> bool:
-        """Whether a rotation about the vertical changes the shape."""
-        return not (code[PLAN] == ROUND and code[LIMB] == NO_LIMB and code[SPOUT] == 0)
-
-    def yaws(self, code: IntArray, count: int) -> int:
-        """Return the number of yaws that a sample is tried at: twice as many with a limb."""
-        return count if code[LIMB] == NO_LIMB else 2 * count
-
-    def walls(self, code: IntArray) -> tuple[int, ...]:
-        """Return slots of the thicknesses of walls around a cavity."""
-        return (SLOT.wall, SLOT.floor) if code[HOLLOW] != 0 else ()
+    def traits(self, code: IntArray) -> Traits:
+        """Return what the parts of a shape imply."""
+        cored, bar = code[PLAN] == CORED, code[LIMB] == BAR
+        return Traits(
+            has_yaw=not (code[PLAN] == ROUND and code[LIMB] == NO_LIMB and code[SPOUT] == 0),
+            yaw_factor=1 if code[LIMB] == NO_LIMB else 2,
+            proportions=(
+                *((SLOT.core_x, SLOT.core_y) if cored else ()),
+                *((SLOT.limb_reach,) if bar else ()),
+            ),
+            walls=(SLOT.wall, SLOT.floor) if code[HOLLOW] != 0 else (),
+            has_sides=bool(cored),
+        )
 
     def rarity(self, code: IntArray, theta: FloatArray, agrees: bool) -> float:
         """Compute the natural logarithm of the rarity of a solid body that widens, and of a trough."""
@@ -339,10 +343,6 @@ class BodyOfRevolution(ShapeKind):
             if sides.min() < limits.MIN_VESSEL_WIDTH * sides.max():
                 return limits.SOLID_RARITY
         return 0.0
-
-    def has_sides(self, code: IntArray) -> bool:
-        """Whether the plan is a rectangle."""
-        return bool(code[PLAN] == CORED)
 
     def set_sides(self, theta: FloatArray, half: FloatArray) -> None:
         """Set ``(2,)`` half sides of a body with a rectangular plan, m."""

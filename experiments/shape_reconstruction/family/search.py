@@ -131,7 +131,7 @@ class FamilySearch:
         return [replace(self.start(one.shape, one.shape.theta), cost=one.cost) for one in draws]
 
     def _at_best_yaw(self, shape: FamilyShape, random: Random) -> Hypothesis:
-        yaws = kind_of(shape.code).yaws(shape.code, self.settings.yaws)
+        yaws = self.settings.yaws * kind_of(shape.code).traits(shape.code).yaw_factor
         tried = place_sample(shape, self.guides, random, self._place_error, yaws)
         tried[:, layout.OUTLINE] = self._bench_middle[layout.OUTLINE]
         prior = PriorRows(self._middle(tried[0]), prior_rows(self._bench, stand_rows(shape.code)))
