@@ -42,13 +42,7 @@ def point_row(code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatA
 
 @inlined
 def shift_by_gel(theta: FloatArray, turn: FloatArray, point: FloatArray) -> tuple[float, float, float]:
-    """Where a place of the sensor is, were the gel off by what the shape's vector says.
-
-    Args:
-        theta: ``(SIZE,)``.
-        turn: ``(3, 3)`` stand from gel.
-        point: ``(3,)`` m.
-    """
+    """Shift a point by the gel's offset in a shape's vector; ``turn`` is ``(3, 3)``, stand from gel."""
     a, b, c = theta[GEL], theta[GEL + 1], theta[GEL + 2]
     x = point[0] + turn[0, 0] * a + turn[0, 1] * b + turn[0, 2] * c
     y = point[1] + turn[1, 0] * a + turn[1, 1] * b + turn[1, 2] * c
@@ -148,13 +142,9 @@ _HALVINGS = 4
 
 @compiled
 def nearest_on_face(code: IntArray, q: FloatArray, face: FloatArray, place: FloatArray) -> float:
-    """The least signed distance of a shape from a rectangle, m.
+    """Find the least signed distance of a shape from a rectangle, m, and fill in its place.
 
-    Args:
-        code: of the shape.
-        q: its prepared numbers.
-        face: ``(3, 3)`` m: the middle of the rectangle, and from there half of either side.
-        place: ``(3,)``, filled in: where it is, m.
+    ``face`` is ``(3, 3)`` m: the middle of the rectangle, and from there half of either side.
     """
     best, a, b = np.inf, 0.0, 0.0
     for i in range(_ACROSS):

@@ -80,7 +80,7 @@ def minimize(
     """Find the vector of least cost near a start, along the directions of ``basis`` (Levenberg-Marquardt).
 
     Args:
-        code: of the shape.
+        code: kind and parts of the shape.
         theta: ``(size,)`` start.
         seen: the readings.
         prior: density of the vector.

@@ -1,5 +1,8 @@
 """A ray of sight's row: how near it passes to a shape, and where it is held as derivatives are taken.
 
+Kernels share arguments: ``code`` and ``theta``, a shape; ``q``, its prepared numbers; ``origin`` and
+``towards``, a ray, m in ``stand``.
+
 A ray's least distance changes as that at its nearest place does (the envelope theorem). Where that place is
 at an edge, distances on both sides of it change otherwise, and the least one as their mean that has no slope
 along the ray (Danskin's theorem): by one side alone a plate would seem pinned along the line of sight.
@@ -56,7 +59,7 @@ def ray_sigma(rays: SightRays) -> float:
 
 
 @inlined
-def sighted(theta: FloatArray, rays: SightRays, i: int, d: float) -> float:
+def ray_residual(theta: FloatArray, rays: SightRays, i: int, d: float) -> float:
     """A ray's residual where it passes the shape at ``d`` m."""
     sigma = ray_sigma(rays)
     if rays.kinds[i] == GRAZE:
@@ -76,16 +79,10 @@ def hold_ray(
     step: float,
     held: FloatArray,
 ) -> None:
-    """Fill in two places on a ray, m along it, and the share of the second: where it is held.
+    """Fill ``held``: two places on a ray, m along it, and the weight of the second.
 
-    Args:
-        code: of the shape.
-        q: its prepared numbers.
-        origin: ``(3,)`` m.
-        towards: ``(3,)``.
-        near: m along it, of the place of least distance so far.
-        step: m by which that may be off.
-        held: ``(3,)`` to fill in; the places are one where the distance has no edge there.
+    ``near``: place of least distance so far, m along the ray, known to ``step``.
+    ``held``: ``(3,)`` buffer; both places are one where the distance has no edge.
     """
     t = _least_on_ray(code, q, origin, towards, near - step, near + step)
     here = _on_ray(code, q, origin, towards, t)
@@ -151,45 +148,21 @@ def nearest_along(
     enough: bool,
     least_step: float,
 ) -> tuple[float, float]:
-    """Least signed distance along a ray, and how far along it is.
+    """Find the least signed distance along a ray, m, and its place, m along the ray.
 
-    Args:
-        code: of the shape.
-        q: its prepared numbers.
-        origin: ``(3,)`` m.
-        direction: ``(3,)`` unit.
-        radius: m of a ball that holds the shape.
-        to_middle: ``(3,)`` m from the origin to the ball's middle.
-        enough: whether any place inside will do: the ray needs only to meet the shape.
-        least_step: m between places on it.
-
-    Returns:
-        M: the least distance found, and where; of a ray that misses the ball, at its place nearest to it.
+    ``radius``: radius of a ball that holds the shape, m, whose centre is at ``to_middle`` from the origin.
+    ``enough``: whether any place inside will do: the ray needs only to hit the shape.
+    ``least_step``: distance between places, m.
     """
     along = to_middle[0] * direction[0] + to_middle[1] * direction[1] + to_middle[2] * direction[2]
     square = to_middle[0] ** 2 + to_middle[1] ** 2 + to_middle[2] ** 2 - along * along
     half = np.sqrt(max(radius * radius - square, 0.0))
     t, end = _between_levels(q, origin, direction, along - half, along + half)
     if t >= end:
-        d = distance(
-            code,
-            q,
-            True,
-            origin[0] + along * direction[0],
-            origin[1] + along * direction[1],
-            origin[2] + along * direction[2],
-        )
-        return d, along
+        return _on_ray(code, q, origin, direction, along), along
     best, where = np.inf, along
     for _ in range(_MOST):
-        d = distance(
-            code,
-            q,
-            True,
-            origin[0] + t * direction[0],
-            origin[1] + t * direction[1],
-            origin[2] + t * direction[2],
-        )
+        d = _on_ray(code, q, origin, direction, t)
         if d < best:
             best, where = d, t
             if enough and d < 0.0:
@@ -217,17 +190,11 @@ def _between_levels(
 def first_hit(
     code: IntArray, theta: FloatArray, starts: FloatArray, directions: FloatArray, length: float
 ) -> FloatArray:
-    """How far along lines a shape is met first.
+    """Find the ``(n,)`` first hits of a shape along lines, m; infinite for a line that misses it.
 
-    Args:
-        code: of the shape.
-        theta: its ``(SIZE,)`` vector.
-        starts: ``(n, 3)`` m in ``stand``.
-        directions: ``(n, 3)`` unit.
-        length: m of each line.
-
-    Returns:
-        ``(n,)`` m; infinite of a line that ends before it meets the shape.
+    ``starts``: ``(n, 3)`` m in ``stand``.
+    ``directions``: ``(n, 3)`` unit vectors.
+    ``length``: length of each line, m.
     """
     q = np.empty(PREPARED)
     prepare(code, theta, q)

@@ -3,6 +3,9 @@
 One likelihood for touch, sight and both: what was not read has no rows. Rows: of each contact its points, its
 normal and the places where its gel touched nothing, every housing that met it, every free place, every ray,
 every point of the single-view prior. A contact counts as a whole: one that slipped loses all its weight.
+
+Kernels share arguments: ``code`` and ``theta``, a shape; ``seen``, the readings; ``q``, a buffer for the
+shape's prepared numbers; ``out``, the rows to fill in.
 """
 
 from typing import NamedTuple
@@ -38,8 +41,8 @@ from experiments.shape_reconstruction.family.rays import (
     nearest_along,
     ray_direction,
     ray_origin,
+    ray_residual,
     ray_sigma,
-    sighted,
 )
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled, inlined
@@ -90,15 +93,8 @@ def evaluate(
 ) -> float:
     """Fill in the rows of a shape; returns half the sum of what they cost.
 
-    Args:
-        code: of the shape.
-        theta: ``(SIZE,)``.
-        seen: readings.
-        robust: lets go of contacts that do not fit; without it they pull with at most a constant force.
-        out: to fill in.
-        q: room.
-        most: a shape that costs more is not asked for: as soon as its rows come to more, infinity is
-            returned, and ``out`` is filled in part.
+    ``robust``: whether contacts that do not fit lose their weight; else they pull with a constant force.
+    ``most``: cost above which the evaluation stops: infinity is returned, and ``out`` is filled in part.
     """
     prepare(code, theta, q)
     n, m = len(seen.points), len(seen.middles)
@@ -144,7 +140,7 @@ def _evaluate_rays(
         d, out.along[i] = nearest_along(
             code, q, origin, towards, radius, to_middle, rays.kinds[i] == MEET, rays.step
         )
-        out.values[first + i] = sighted(theta, rays, i, d)
+        out.values[first + i] = ray_residual(theta, rays, i, d)
         cost += _weigh(first + i, rays.weight[i], out)
         if cost > most:
             return np.inf
@@ -217,14 +213,9 @@ def slopes_along(
 ) -> FloatArray:
     """``(n, active)`` derivatives of some rows along directions.
 
-    Args:
-        code: of the shape.
-        theta: ``(SIZE,)``.
-        seen: readings.
-        basis: ``(n, SIZE)``.
-        active: rows, ascending, of all points and of others.
-        out: as ``evaluate`` leaves it there; where rays are held is filled in.
-        q: room.
+    ``basis``: ``(n, size)`` directions.
+    ``active``: rows, ascending, of all points and of others.
+    ``out``: as ``evaluate`` leaves it; where rays are held is filled in.
     """
     base, here, moves = np.empty(len(active)), np.empty(len(active)), np.empty((3, len(active)))
     hold_rays(code, theta, seen, active, out, q)
@@ -254,14 +245,9 @@ def slopes_along(
 def _carried(
     seen: FamilyEvidence, active: IntArray, moves: FloatArray, direction: FloatArray, out: FloatArray
 ) -> None:
-    """Fill in what a direction's moves of body, gel and camera, and of the outline, change of some rows.
+    """Fill in the derivatives of some rows along a direction by moves of body, gel, camera and outline.
 
-    Args:
-        seen: readings.
-        active: rows.
-        moves: ``(3, active)`` their derivatives by the body's moves.
-        direction: ``(SIZE,)``.
-        out: ``(active,)``.
+    ``moves`` are the ``(3, active)`` derivatives by the body's moves.
     """
     points, faces = len(seen.points), contact_row_count(seen)
     clear = points + 3 * len(seen.middles)
@@ -324,15 +310,10 @@ def fill_frozen(
 ) -> None:
     """Fill in the residuals of some rows with rays and housings held in place: what derivatives are taken of.
 
-    Args:
-        code: of the shape.
-        theta: ``(SIZE,)``.
-        seen: readings.
-        active: rows, ascending.
-        held: where, as ``evaluate`` and ``hold_rays`` leave it.
-        of_sight: whether only rays and points of the single-view prior are filled in.
-        q: room.
-        out: ``(active,)``.
+    ``active``: rows, ascending.
+    ``held``: rows as ``evaluate`` and ``hold_rays`` leave them.
+    ``of_sight``: whether only rays and points of the single-view prior are filled in.
+    ``out``: ``(active,)`` buffer.
     """
     prepare(code, theta, q)
     n, first, ray = len(seen.points), contact_row_count(seen), first_ray(seen)
@@ -367,7 +348,7 @@ def fill_frozen(
             i -= ray
             ray_direction(theta, rays, i, towards)
             d = held_distance(code, q, origin, towards, held.held[i])
-            out[row] = sighted(theta, rays, i, d)
+            out[row] = ray_residual(theta, rays, i, d)
 
 
 @compiled
