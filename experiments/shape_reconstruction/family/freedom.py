@@ -122,18 +122,13 @@ def stand_rows(code: IntArray) -> FloatArray:
 
 
 _NAMES = {
-    layout.X: ("its place", "mm", 1e3),
-    layout.Y: ("its place", "mm", 1e3),
+    **dict.fromkeys((layout.X, layout.Y), ("its place", "mm", 1e3)),
     layout.LIFT: ("its support's height", "mm", 1e3),
-    layout.TILT_X: ("its upright", "deg", np.degrees(1.0)),
-    layout.TILT_Y: ("its upright", "deg", np.degrees(1.0)),
-    layout.CAMERA_RIGHT: ("the camera's place", "mm", 1e3),
-    layout.CAMERA_DOWN: ("the camera's place", "mm", 1e3),
+    **dict.fromkeys((layout.TILT_X, layout.TILT_Y), ("its upright", "deg", np.degrees(1.0))),
+    **dict.fromkeys((layout.CAMERA_RIGHT, layout.CAMERA_DOWN), ("the camera's place", "mm", 1e3)),
     layout.CAMERA_SCALE: ("the picture's scale", "%", 1e2),
     layout.OUTLINE: ("the mask's border", "mm", 1e3),
-    layout.GEL: ("the gel's place", "mm", 1e3),
-    layout.GEL + 1: ("the gel's place", "mm", 1e3),
-    layout.GEL + 2: ("the gel's place", "mm", 1e3),
+    **dict.fromkeys(range(layout.GEL, layout.GEL + 3), ("the gel's place", "mm", 1e3)),
 }
 """Name, unit, and factor to that unit, of each bench error."""
 

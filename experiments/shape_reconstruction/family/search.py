@@ -7,27 +7,8 @@ import numpy as np
 
 from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.freedom import (
-    OUTLINE_BIAS,
-    NuisanceCost,
-    basis_of,
-    bench_rows,
-    nuisance_cost,
-    prior_rows,
-    shape_rows,
-    stand_basis,
-    stand_rows,
-)
+from experiments.shape_reconstruction.family import freedom, kinds, layout
 from experiments.shape_reconstruction.family.kind import FamilyShape, Random
-from experiments.shape_reconstruction.family.kinds import (
-    CLASSES,
-    codes_of,
-    draw_shape,
-    kind_of,
-    rarity,
-    rarity_of_size,
-)
 from experiments.shape_reconstruction.family.minimize import PriorRows, cheapest, minimize, total_cost
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
 from experiments.shape_reconstruction.family.proposals import Guides, change, guides_of, perturb, place_sample
@@ -65,7 +46,7 @@ class Hypothesis:
 
     @property
     def misfit(self) -> float:
-        """The cost without the price of rarity."""
+        """The cost without the price of kinds.rarity."""
         return self.cost - self.price
 
 
@@ -84,11 +65,11 @@ class FamilySearch:
         self.full: FamilyEvidence = observe(evidence)  #: all readings.
         self._place_error = evidence.place_error
         rays = self.full.rays
-        self._bench = bench_rows(
+        self._bench = freedom.bench_rows(
             evidence.place_error, evidence.support_error, rays.pixel, rays.position_sigma, rays.scale_sigma
         )
         self._bench_middle = np.zeros(layout.POSE_SIZE)
-        self._bench_middle[layout.OUTLINE] = OUTLINE_BIAS * rays.pixel
+        self._bench_middle[layout.OUTLINE] = freedom.OUTLINE_BIAS * rays.pixel
 
     def run(self, seeds: Iterable[Hypothesis] = ()) -> list[Hypothesis]:
         """Run all stages; return hypotheses in the order of their cost.
@@ -107,12 +88,12 @@ class FamilySearch:
 
     def _propose(self) -> Iterator[tuple[list[FamilyShape], Random]]:
         """Sample all classes; yield the samples of each combination of parts with the class's generator."""
-        each = -(-self.settings.draws // sum(len(codes_of(name)) for name in CLASSES))
-        for k, name in enumerate(CLASSES):
+        each = -(-self.settings.draws // sum(len(kinds.codes_of(name)) for name in kinds.CLASSES))
+        for k, name in enumerate(kinds.CLASSES):
             # A class is sampled independently of the others: a change to one changes none of them.
             random = np.random.default_rng((self.settings.seed, k))
             by_code: dict[bytes, list[FamilyShape]] = {}
-            for shape in (draw_shape(name, random) for _ in range(each * len(codes_of(name)))):
+            for shape in (kinds.draw_shape(name, random) for _ in range(each * len(kinds.codes_of(name)))):
                 by_code.setdefault(shape.code.tobytes(), []).append(shape)
             yield from ((shapes, random) for shapes in by_code.values())
 
@@ -131,10 +112,12 @@ class FamilySearch:
         return [replace(self.start(one.shape, one.shape.theta), cost=one.cost) for one in draws]
 
     def _at_best_yaw(self, shape: FamilyShape, random: Random) -> Hypothesis:
-        yaws = self.settings.yaws * kind_of(shape.code).traits(shape.code).yaw_factor
+        yaws = self.settings.yaws * kinds.kind_of(shape.code).traits(shape.code).yaw_factor
         tried = place_sample(shape, self.guides, random, self._place_error, yaws)
         tried[:, layout.OUTLINE] = self._bench_middle[layout.OUTLINE]
-        prior = PriorRows(self._middle(tried[0]), prior_rows(self._bench, stand_rows(shape.code)))
+        prior = PriorRows(
+            self._middle(tried[0]), freedom.prior_rows(self._bench, freedom.stand_rows(shape.code))
+        )
         best, cost = cheapest(
             shape.code, tried, self.coarse, prior, make_rows(self.coarse), prepared_buffer()
         )
@@ -144,7 +127,7 @@ class FamilySearch:
     def _placed(self, one: Hypothesis, rounds: int) -> Hypothesis:
         """Fit position, yaw and size to the coarse readings."""
         shape, guides = one.shape, self.guides
-        basis = stand_basis(shape.code, guides.sighted and guides.touched)
+        basis = freedom.stand_basis(shape.code, guides.sighted and guides.touched)
         theta, cost, curvature = minimize(
             shape.code, shape.theta, self.coarse, one.prior, basis, False, rounds, False
         )
@@ -167,12 +150,12 @@ class FamilySearch:
             last: whether contacts that do not fit lose their weight, and the curvature is computed.
         """
         code = one.shape.code
-        basis = basis_of(code, self.guides.sighted, self.guides.touched)
+        basis = freedom.basis_of(code, self.guides.sighted, self.guides.touched)
         theta, cost, curvature = minimize(
             code, one.shape.theta, self.full, one.prior, basis, last, rounds, last
         )
         shape = FamilyShape(one.shape.name, code, theta)
-        price = limits.TEMPERATURE * (rarity(shape) + rarity_of_size(shape))
+        price = limits.TEMPERATURE * (kinds.rarity(shape) + kinds.rarity_of_size(shape))
         return Hypothesis(shape, one.prior, cost + price, curvature, price)
 
     # Stage 4: vary parts, then all parameters.
@@ -238,12 +221,14 @@ class FamilySearch:
             shape: in ``stand``.
             middle: ``(size,)`` mean of the prior of its parameters.
         """
-        prior = PriorRows(self._middle(middle), prior_rows(self._bench, shape_rows(shape.code)))
+        prior = PriorRows(
+            self._middle(middle), freedom.prior_rows(self._bench, freedom.shape_rows(shape.code))
+        )
         return Hypothesis(shape, prior, np.inf, np.empty((0, 0)))
 
-    def nuisance(self, shape: FamilyShape) -> NuisanceCost:
+    def nuisance(self, shape: FamilyShape) -> freedom.NuisanceCost:
         """Compute the cost of the bench errors that a shape needs."""
-        return nuisance_cost(shape.theta, self._bench, self._bench_middle)
+        return freedom.nuisance_cost(shape.theta, self._bench, self._bench_middle)
 
     def _middle(self, theta: FloatArray) -> FloatArray:
         middle = theta.copy()

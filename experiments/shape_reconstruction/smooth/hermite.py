@@ -15,6 +15,7 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.fits import SmoothFit
+from experiments.shape_reconstruction.smooth import knowledge
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
 from experiments.shape_reconstruction.smooth.free_space import (
     CLEARANCE,
@@ -23,13 +24,6 @@ from experiments.shape_reconstruction.smooth.free_space import (
     silhouette_of,
 )
 from experiments.shape_reconstruction.smooth.grid import Grid
-from experiments.shape_reconstruction.smooth.knowledge import (
-    beyond_deviation,
-    hollow_deviation,
-    known_by,
-    limited_sides,
-    not_bounded,
-)
 from experiments.shape_reconstruction.smooth.revolution import (
     SLACK,
     Revolution,
@@ -185,10 +179,10 @@ class _Fit:
 
 
 def _finished(fit: _Fit, mesh: Mesh, start: float) -> RbfFit:
-    known = known_by(mesh, fit.samples, fit.silhouette)
-    sides = limited_sides(mesh, fit.samples, fit.silhouette)
-    beyond = beyond_deviation(mesh, known, sides, fit.evidence.largest)
-    hollow = hollow_deviation(mesh, known, fit.samples)
+    known = knowledge.known_by(mesh, fit.samples, fit.silhouette)
+    sides = knowledge.limited_sides(mesh, fit.samples, fit.silhouette)
+    beyond = knowledge.beyond_deviation(mesh, known, sides, fit.evidence.largest)
+    hollow = knowledge.hollow_deviation(mesh, known, fit.samples)
     some = np.random.default_rng(0).permutation(len(mesh.vertices))[:_SOME]
     deviations = fit.field.deviations(mesh.vertices[some])
     # The other vertices are as the nearest three of those.
@@ -203,7 +197,7 @@ def _finished(fit: _Fit, mesh: Mesh, start: float) -> RbfFit:
         mesh=mesh,
         deviation=np.sqrt(smooth**2 + READING**2 + beyond**2 + hollow**2),
         known_by=known,
-        not_bounded=not_bounded(sides),
+        not_bounded=knowledge.not_bounded(sides),
         doubtful=fit.left_out.outliers,
         flags=tuple(flag for flag in (round_, open_) if flag),
         seconds=time.perf_counter() - start,
