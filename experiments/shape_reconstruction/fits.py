@@ -10,8 +10,7 @@ from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 
-FOLDS = 8
-"""Parts in which contacts are left out: the time of a prediction does not grow with their number."""
+FOLDS = 8  #: parts in which contacts are left out: the time does not grow with their number.
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -20,7 +20,7 @@ from experiments.shape_reconstruction.family.contact_fit import contact_fit, dis
 from experiments.shape_reconstruction.family.estimate import POINT_SIGMA, fit_family, open_without_class
 from experiments.shape_reconstruction.family.observed import directions_of
 from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
-from experiments.shape_reconstruction.family.settings import ANEW, FamilySettings
+from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
 from experiments.shape_reconstruction.fits import FamilyFit, SmoothFit, folds_of
 from experiments.shape_reconstruction.prior.network import with_prior_points
 from experiments.shape_reconstruction.prior.surface import predict_surface
@@ -131,7 +131,7 @@ def _continue(
     found = _with_predictions(found, evidence, smooth, found.seconds)
     if not is_poor(found) and rejection_reason(found, smooth) is None:
         return found
-    again = _fit(evidence, replace(ANEW, seed=settings.seed), found.mixture.hypotheses)
+    again = _fit(evidence, replace(LEVELS["coarse"], seed=settings.seed), found.mixture.hypotheses)
     return _with_predictions(again, evidence, smooth, found.seconds + again.seconds)
 
 

@@ -10,8 +10,7 @@ from experiments.shape_reconstruction.family.layout import BENT, POSE_SIZE
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
 
-GIRTH_KNOTS = 5
-"""Places along the arc at which the section has a radius."""
+GIRTH_KNOTS = 5  #: points along the arc at which the section has a radius.
 
 _S = TypeVar("_S")
 _A = TypeVar("_A")
@@ -32,8 +31,7 @@ def _by_name(own: FloatArray) -> BentParameters[float, FloatArray]:
 
 _parameters = compiled(_by_name)
 
-SIZE = POSE_SIZE + 8
-"""Numbers of a bent body's vector."""
+SIZE = POSE_SIZE + 8  #: numbers of a bent body's vector.
 
 SLOT = cast(BentParameters[int, IntArray], _by_name(cast(FloatArray, np.arange(POSE_SIZE, SIZE))))
 """Slot of each parameter in a shape's vector."""

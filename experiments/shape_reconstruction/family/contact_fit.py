@@ -1,8 +1,7 @@
 """Compare contacts with a fitted shape: residuals, outliers, turned contacts, and moving the surface to them.
 
-A turned contact is one whose pose is rotated against the shape, as a wrong pose of the arm makes it. It is
-moved as a rigid patch: shifted a little along a curved wall it is rotated against the wall as well, so a
-shift may explain a rotation as far as shifts are likely.
+A rotated contact has a wrong pose of the arm. It is moved as a rigid patch: a shift along a curved wall may
+explain a rotation as far as shifts are likely.
 """
 
 from dataclasses import dataclass

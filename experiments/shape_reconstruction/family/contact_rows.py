@@ -16,11 +16,10 @@ NORMAL_STEP = 1.2e-3
 """M between the places of which a shape's normal is taken."""
 
 CLEAR_SIGMA = 0.4e-3
-"""M by which a shape that passes through a contact's points may seem to reach into the gel beside them: most
-of what a contact is off by, all its places share."""
+"""Standard deviation of a clear point, m: most of a contact's error is shared by all its points."""
 
 SHARED = 1.5e-3
-"""M that a contact is off by as a whole, at most, where its places are compared with each other."""
+"""Largest error of a contact as a whole where its points are compared with each other, m."""
 
 SLIPPED = 12.0
 """A contact's sum of squares at which it has half its weight."""

@@ -41,8 +41,7 @@ SPREAD_OVER = 4
 """Of the shapes drawn about each hypothesis, over which the spread at every vertex is taken."""
 
 POINT_SIGMA = 1.6e-3
-"""One standard deviation of each of the eight points of a contact that a surface is moved to, m: they err
-together, and each counts as a part of it."""
+"""Standard deviation of each of a contact's eight points that a surface is moved to, m: they err together."""
 
 FINER = "if they did not slip, a finer search may fit them: shape.method=family-fine, in thrice family's time"
 """Said where several contacts do not fit: a search may have missed the shape."""

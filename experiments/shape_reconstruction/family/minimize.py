@@ -24,8 +24,7 @@ class PriorRows(NamedTuple):
     rows: FloatArray  #: ``(k, size)``: ``rows @ (theta - middle)`` are independent, of unit deviation.
 
 
-_SETTLED = 1.0e-3
-"""Fraction of the cost: an iteration that gains less is the last."""
+_SETTLED = 1.0e-3  #: fraction of the cost: an iteration that gains less is the last.
 
 _HOPELESS = 1.0e6
 _MAX_STEP = 0.6

@@ -31,8 +31,7 @@ NORMAL_MODEL = float(np.radians(6.0))
 """Rad by which a normal of that shape is off the surface's, one standard deviation."""
 
 NORMAL_SPREAD_FACTOR = 0.5
-"""Error of the mean normal over the spread of a contact's normals: at an edge it depends on the place of
-contact."""
+"""Error of the mean normal over the spread of a contact's normals, which is wide at an edge."""
 
 HOUSING_FACTOR = 2.0
 """Factor on a contact's deviation for a housing in contact: its nearest place jumps as a shape moves, and a
@@ -53,9 +52,7 @@ class SightRays(NamedTuple):
     directions: FloatArray  #: ``(n, 3)`` unit.
     kinds: IntArray  #: ``(n,)`` ``PASS``, ``GRAZE`` or ``MEET``.
     weight: FloatArray  #: ``(n,)`` weight of each one's squared residual.
-    gain: FloatArray
-    """``(n,)`` by which a distance counts for more than it is: a thin part far outside of the mask is as
-    wrong as a thick one."""
+    gain: FloatArray  #: ``(n,)`` factors on distances: thin parts far outside the mask are as wrong.
     pixel: float  #: m per pixel at the object, a first guess of it.
     right: FloatArray  #: ``(3,)`` unit, axes of the picture.
     down: FloatArray  #: ``(3,)`` unit, axes of the picture.
@@ -76,22 +73,19 @@ class FamilyEvidence(NamedTuple):
     normals: FloatArray  #: ``(contacts, 3)`` unit, outward.
     normal_sigma: FloatArray  #: ``(contacts,)``.
     gel: FloatArray  #: ``(contacts, 3, 3)`` rotations, stand from gel.
-    clear: FloatArray
-    """``(c, 3)`` m on the gel's face, beside what contacts touched: the object is not there."""
+    clear: FloatArray  #: ``(c, 3)`` points of the gel's face that touched nothing next to a contact, m.
     clear_touch: IntArray  #: ``(c,)`` which contact each is of.
     clear_weight: FloatArray  #: ``(contacts,)`` weight of each such place's squared residual.
     faces: FloatArray
-    """``(h, 3, 3)`` m, of each housing that met the object with nothing in the gel: the middle of its face,
-    and from there half of either side."""
+    """``(h, 3, 3)`` m, of each housing in contact: the middle of its face, and half of either side."""
     face_gel: FloatArray  #: ``(h, 3, 3)`` rotations, stand from gel.
     face_sigma: FloatArray  #: ``(h,)`` m.
     free: FloatArray  #: ``(k, 3)`` m where the sensor was, so that the object is not.
     rays: SightRays  #: of the picture; none without one.
     prior_points: FloatArray  #: ``(s, 3)`` points of the single-view prior, m.
     prior_weight: float  #: weight of each such place's squared residual.
-    prior_right: FloatArray
-    """``(3,)`` shift of those along the support, m, per m that the camera is off to the picture's right."""
-    prior_down: FloatArray  #: ``(3,)`` the same, downward in the picture.
+    prior_right: FloatArray  #: ``(3,)`` their shift along the support per shift of the picture to the right.
+    prior_down: FloatArray  #: ``(3,)`` the same of a shift down.
 
 
 def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:

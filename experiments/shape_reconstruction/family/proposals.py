@@ -34,9 +34,8 @@ class Guides:
     places: FloatArray  #: ``(contacts, 3)`` m, of the contacts.
     middles: FloatArray  #: ``(n, 2)`` m, where the object's middle may be, by its contacts.
     extents: FloatArray  #: ``(3,)`` m, of the box around the contacts and the support; zero without contacts.
-    turns: FloatArray  #: ``(m,)`` rad, ways that its long side or a flat side may look.
-    seen: FloatArray
-    """``(2,)`` m across and up the picture at a metre's distance, of the silhouette; zero without one."""
+    turns: FloatArray  #: ``(m,)`` directions that its long side or a flat side may face, rad.
+    seen: FloatArray  #: ``(2,)`` width and height of the silhouette at 1 m, m; zero without one.
     eye: FloatArray  #: ``(3,)`` m, of the camera.
     middle_ray: FloatArray  #: ``(3,)`` unit, towards the middle of the silhouette's box.
     outline: FloatArray  #: ``(k, 3)`` unit, towards the silhouette's border; none without one.

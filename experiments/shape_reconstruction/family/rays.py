@@ -33,8 +33,7 @@ _GOLDEN, _SECTIONS = 0.6180339887498949, 9
 """Of a part of a ray, what is kept of it at each section, and sections: of 5 mm, 0.04 mm are left."""
 
 _SIDE, _LEVEL = 0.15e-3, 0.05
-"""M to both sides of a ray's nearest place where slopes are looked at, and slopes from which on it is at an
-edge."""
+"""Distance from a ray's nearest place at which slopes are taken, m; slopes from which on it is at an edge."""
 
 
 @compiled
@@ -133,8 +132,7 @@ _BEYOND = 10.0e-3
 """M above and below the shape at which a ray is still followed: it may pass its rim."""
 
 _SURE, _FINE = 0.7, 0.5e-3
-"""Of a distance, the share that a line is followed by at once, as distances may be too great by so much
-beside corners; and m, the least step."""
+"""Fraction of a distance that a line is followed by, as it may be too great at corners; least step, m."""
 
 
 @compiled

@@ -8,8 +8,7 @@ from experiments.shape_reconstruction.family.layout import POSE_SIZE
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
 
-KNOTS = 7
-"""Heights at which a section has a radius."""
+KNOTS = 7  #: heights at which a section has a radius.
 
 HOLLOW, PLAN, LIMB, SPOUT = 1, 2, 3, 4
 """Entries of a code: the parts of a body of revolution."""
@@ -60,8 +59,7 @@ def _by_name(own: FloatArray) -> RevolutionParameters[float, FloatArray]:
 
 _parameters = compiled(_by_name)
 
-SIZE = POSE_SIZE + 34
-"""Numbers of a body of revolution's vector."""
+SIZE = POSE_SIZE + 34  #: numbers of a body of revolution's vector.
 
 SLOT = cast(RevolutionParameters[int, IntArray], _by_name(cast(FloatArray, np.arange(POSE_SIZE, SIZE))))
 """Slot of each parameter in a shape's vector."""

@@ -40,8 +40,7 @@ def _by_name(own: FloatArray) -> ToolParameters[float]:
 
 _parameters = compiled(_by_name)
 
-SIZE = POSE_SIZE + 10
-"""Numbers of a tool's vector."""
+SIZE = POSE_SIZE + 10  #: numbers of a tool's vector.
 
 SLOT = cast(ToolParameters[int], _by_name(cast(FloatArray, np.arange(POSE_SIZE, SIZE))))
 """Slot of each parameter in a shape's vector."""

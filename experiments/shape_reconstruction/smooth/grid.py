@@ -86,7 +86,7 @@ class Grid:
 
 
 INSIDE = 2.0e-3
-"""Cells below zero from which a corner is inside: twice the clearance that the surface extraction keeps."""
+"""Cells below zero from which a corner is inside: twice the clearance of the surface extraction."""
 
 _BRIDGE = 0.4
 """Cells that the corners of a bridge are inside."""

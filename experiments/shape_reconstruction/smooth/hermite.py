@@ -5,7 +5,7 @@ Rays along the border of a silhouette add places of the surface; contacts left o
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
@@ -33,7 +33,6 @@ from experiments.shape_reconstruction.smooth.revolution import (
 )
 from experiments.shape_reconstruction.smooth.thin_plate import SurfaceData, ThinPlateField, fitted
 from harness.basics.arrays import FloatArray
-from harness.basics.mesh import Mesh
 
 PITCH = 4.0e-3
 """M between corners of the grid on which the surface is found."""
@@ -42,9 +41,8 @@ MARGIN = 10.0e-3
 """M beyond the contacts that the object may reach."""
 
 SLOPE, ENTERED_SLOPE = 0.3, 0.15
-"""M beyond the hull of the contacts for every m from the nearest of them: the object reaches no farther. Less
-of a round body that the sensor went down into, whose contacts are turned about its axis. Found on sixteen
-development runs."""
+"""Largest distance beyond the hull of the contacts per m from the nearest contact; the same of a round body
+that the sensor entered, whose contacts are rotated about its axis."""
 
 FOOT = 0.6
 """Of the contacts' width that of the object at its support is, within the hull."""
@@ -139,7 +137,7 @@ def fit_rbf(evidence: ShapeEvidence, symmetric: bool = True) -> RbfFit:
     )
     low, high = _box(data.points, evidence.largest)
     by_contacts = field = fitted(data, low, high)
-    left_out = predict_by_field(evidence, by_contacts)
+    left_out, outliers = _predict_left_out(evidence, by_contacts)
     if axis is not None:
         data = data.joined(_copies(axis, samples, evidence, silhouette))
         low, high = _box(data.points, evidence.largest)
@@ -151,45 +149,12 @@ def fit_rbf(evidence: ShapeEvidence, symmetric: bool = True) -> RbfFit:
         field = fitted(data.joined(rim), low, high, by_contacts.amplitude)
     grid = Grid.over(low, high, PITCH)
     body = grid.surface(grid.near_zero(_cut(field, bounds)), samples.points)
-    found = _finished(_Fit(evidence, whole, silhouette, field, axis, left_out), body.mesh, start)
-    return replace(found, flags=(*found.flags, *body.notes))
-
-
-@dataclass(frozen=True, eq=False)
-class LeftOut:
-    """Predictions of left-out contacts by the field."""
-
-    errors: FloatArray
-    """``(contacts,)`` rms distance of each from the field fitted without it, m; zero where thinning kept no
-    point of it."""
-    outliers: dict[int, float]
-    """distance of each outlier by the index of its touch, m."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """What the answer is made of."""
-
-    evidence: ShapeEvidence
-    samples: ContactSamples
-    silhouette: Silhouette | None
-    field: ThinPlateField
-    axis: Revolution | None
-    left_out: LeftOut
-
-
-def _finished(fit: _Fit, mesh: Mesh, start: float) -> RbfFit:
-    known = knowledge.known_by(mesh, fit.samples, fit.silhouette)
-    sides = knowledge.limited_sides(mesh, fit.samples, fit.silhouette)
-    beyond = knowledge.beyond_deviation(mesh, known, sides, fit.evidence.largest)
-    hollow = knowledge.hollow_deviation(mesh, known, fit.samples)
-    some = np.random.default_rng(0).permutation(len(mesh.vertices))[:_SOME]
-    deviations = fit.field.deviations(mesh.vertices[some])
-    # The other vertices are as the nearest three of those.
-    apart, near = (np.asarray(one) for one in cKDTree(mesh.vertices[some]).query(mesh.vertices, k=[1, 2, 3]))
-    share = 1.0 / (apart + 1e-6)
-    smooth = np.asarray((share * deviations[near]).sum(axis=1) / share.sum(axis=1))
-    round_ = "supposed to be round about a vertical axis, as its contacts are" if fit.axis else ""
+    mesh, sides = body.mesh, knowledge.limited_sides(body.mesh, whole, silhouette)
+    known = knowledge.known_by(mesh, whole, silhouette)
+    beyond = knowledge.beyond_deviation(mesh, known, sides, evidence.largest)
+    hollow = knowledge.hollow_deviation(mesh, known, whole)
+    smooth = _field_deviation(field, mesh.vertices)
+    round_ = "supposed to be round about a vertical axis, as its contacts are" if axis else ""
     open_ = (
         "may be hollow: its top was touched nowhere near its middle" if (hollow > 0.0).mean() > _MOUTH else ""
     )
@@ -198,15 +163,25 @@ def _finished(fit: _Fit, mesh: Mesh, start: float) -> RbfFit:
         deviation=np.sqrt(smooth**2 + READING**2 + beyond**2 + hollow**2),
         known_by=known,
         not_bounded=knowledge.not_bounded(sides),
-        doubtful=fit.left_out.outliers,
-        flags=tuple(flag for flag in (round_, open_) if flag),
+        doubtful=outliers,
+        flags=(*(flag for flag in (round_, open_) if flag), *body.notes),
         seconds=time.perf_counter() - start,
         estimator="rbf",
-        counts={"contacts": len(fit.evidence.contacts)},
-        left_out=fit.left_out.errors,
-        amplitude=fit.field.amplitude,
-        axis=fit.axis,
+        counts={"contacts": len(evidence.contacts)},
+        left_out=left_out,
+        amplitude=field.amplitude,
+        axis=axis,
     )
+
+
+def _field_deviation(field: ThinPlateField, vertices: FloatArray) -> FloatArray:
+    """``(n,)`` m, one standard deviation of the field at some vertices, interpolated at the others."""
+    some = np.random.default_rng(0).permutation(len(vertices))[:_SOME]
+    deviations = field.deviations(vertices[some])
+    # The other vertices are as the nearest three of those.
+    apart, near = (np.asarray(one) for one in cKDTree(vertices[some]).query(vertices, k=[1, 2, 3]))
+    share = 1.0 / (apart + 1e-6)
+    return np.asarray((share * deviations[near]).sum(axis=1) / share.sum(axis=1))
 
 
 def _copies(
@@ -322,8 +297,11 @@ def _border(silhouette: Silhouette) -> tuple[FloatArray, FloatArray]:
 _SAME_PLACE = 1e-12
 
 
-def predict_by_field(evidence: ShapeEvidence, field: ThinPlateField) -> LeftOut:
+def _predict_left_out(evidence: ShapeEvidence, field: ThinPlateField) -> tuple[FloatArray, dict[int, float]]:
     """Predict each contact from the field without it.
+
+    Returns ``(contacts,)`` rms distances of the contacts from their predictions, m, zero where thinning kept
+    no point, and the distance of each outlier by the index of its touch, m.
 
     With ``P`` the inverse of the covariance, a block left out is off by ``inv(P_bb) (P y)_b``, with the
     covariance ``inv(P_bb)`` (Rasmussen and Williams, Gaussian processes for machine learning, 2006,
@@ -346,4 +324,4 @@ def predict_by_field(evidence: ShapeEvidence, field: ThinPlateField) -> LeftOut:
         sigma = float(np.sqrt(block[values, values].mean()))
         if abs(mean) > limits.MAX_PREDICTION_SIGMAS * sigma:
             found[contact.index] = abs(mean) * field.reach
-    return LeftOut(errors, found)
+    return errors, found

@@ -37,7 +37,6 @@ class Revolution:
     """An axis that contacts agree on."""
 
     centre: FloatArray  #: ``(2,)`` m, x and y of the axis in ``stand``.
-    share: float  #: of the horizontal parts of the normals that meet it.
     of_body: BoolArray  #: ``(n,)`` which samples do: the others are a handle's, or whatever else stands out.
 
     def copies(self, samples: ContactSamples) -> tuple[FloatArray, FloatArray]:
@@ -85,7 +84,7 @@ def find_revolution(samples: ContactSamples, seed: int = 0) -> Revolution | None
     angles = np.sort(np.arctan2(out[:, 1], out[:, 0]))
     gap = float(np.diff(angles, append=angles[:1] + 2.0 * np.pi).max(initial=0.0))
     believed = share >= limits.MIN_RADIAL and agreeing >= limits.MIN_AGREEING and gap <= limits.MAX_OPEN_ANGLE
-    return Revolution(centre, share, of_body) if believed else None
+    return Revolution(centre, of_body) if believed else None
 
 
 def _best_centre(side: ContactSamples) -> FloatArray:

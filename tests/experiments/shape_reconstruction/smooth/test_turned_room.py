@@ -39,7 +39,7 @@ def vessel() -> ShapeEvidence:
 
 
 def axis_of(samples: ContactSamples) -> Revolution:
-    return Revolution(CENTRE[:2], 1.0, np.ones(len(samples.points), dtype=bool))
+    return Revolution(CENTRE[:2], np.ones(len(samples.points), dtype=bool))
 
 
 def circle(radius: float, z: float) -> FloatArray:
