@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from experiments.shape_reconstruction import thresholds as limits
-from experiments.shape_reconstruction.fits import FamilyFit, SmoothFit
+from experiments.shape_reconstruction.fits import FamilyFit, SmoothSurface
 from experiments.shape_reconstruction.surface import TOUCHED, ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 
 
-def choose(fit: FamilyFit | None, smooth: SmoothFit | None, prior: ShapeEstimate | None) -> ShapeEstimate:
+def choose(fit: FamilyFit | None, smooth: SmoothSurface | None, prior: ShapeEstimate | None) -> ShapeEstimate:
     """Choose the answer, and state what it rests on.
 
     Without a contact the answer is the prior, or the family where the prior does not apply. From the first
@@ -50,7 +50,7 @@ def choose(fit: FamilyFit | None, smooth: SmoothFit | None, prior: ShapeEstimate
     )
 
 
-def rejection_reason(fit: FamilyFit, smooth: SmoothFit | None) -> str | None:
+def rejection_reason(fit: FamilyFit, smooth: SmoothSurface | None) -> str | None:
     """State why the family is not the answer; None where it is.
 
     Args:
@@ -81,7 +81,7 @@ def rejection_reason(fit: FamilyFit, smooth: SmoothFit | None) -> str | None:
     return None
 
 
-def _as_smooth(smooth: SmoothFit, flags: tuple[str, ...], reason: str) -> SmoothFit:
+def _as_smooth(smooth: SmoothSurface, flags: tuple[str, ...], reason: str) -> SmoothSurface:
     answer = f"the answer is the smooth surface through all contacts ({smooth.estimator})"
     return replace(
         smooth,

@@ -62,7 +62,7 @@ class FamilyFit(FittedShape):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SmoothFit(FittedShape):
+class SmoothSurface(FittedShape):
     """A smooth surface through the contacts."""
 
     rejected: FamilyFit | None = None

@@ -21,7 +21,7 @@ from experiments.shape_reconstruction.family.estimate import POINT_SIGMA, fit_fa
 from experiments.shape_reconstruction.family.observed import directions_of
 from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
 from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
-from experiments.shape_reconstruction.fits import FamilyFit, SmoothFit, folds_of
+from experiments.shape_reconstruction.fits import FamilyFit, SmoothSurface, folds_of
 from experiments.shape_reconstruction.prior.network import with_prior_points
 from experiments.shape_reconstruction.prior.surface import predict_surface
 from experiments.shape_reconstruction.smooth.bent_prior import bend_prior
@@ -80,20 +80,20 @@ def reconstruct(
             raise
         return choose(None, smooth, None)
     found = choose(fit, smooth, None)
-    if isinstance(found, SmoothFit):
+    if isinstance(found, SmoothSurface):
         found = replace(found, rejected=fit)
     return replace(found, seconds=fit.seconds + (0.0 if smooth is None else smooth.seconds))
 
 
 def _hypotheses_of(previous: ShapeEstimate) -> tuple[Hypothesis, ...]:
     """Hypotheses of the family in an answer, or those that it was preferred to."""
-    fit = previous.rejected if isinstance(previous, SmoothFit) else previous
+    fit = previous.rejected if isinstance(previous, SmoothSurface) else previous
     return fit.mixture.hypotheses if isinstance(fit, FamilyFit) else ()
 
 
-def _smooth(evidence: ShapeEvidence) -> SmoothFit | None:
+def _smooth(evidence: ShapeEvidence) -> SmoothSurface | None:
     """Fit the smooth surface that predicts left-out contacts best; None where there is none."""
-    found: list[SmoothFit] = []
+    found: list[SmoothSurface] = []
     if not evidence.contacts:
         return None
     if evidence.sighted:
@@ -109,7 +109,7 @@ def _smooth(evidence: ShapeEvidence) -> SmoothFit | None:
     return min(alike, key=lambda one: one.misfit, default=None)
 
 
-def _search(evidence: ShapeEvidence, settings: FamilySettings, smooth: SmoothFit | None) -> FamilyFit:
+def _search(evidence: ShapeEvidence, settings: FamilySettings, smooth: SmoothSurface | None) -> FamilyFit:
     """Fit the family by one to three searches, each with its own draws, and return the best fit."""
     best = _fit(evidence, settings)
     seconds, made = best.seconds, 1
@@ -124,7 +124,7 @@ def _continue(
     evidence: ShapeEvidence,
     settings: FamilySettings,
     seeds: Sequence[Hypothesis],
-    smooth: SmoothFit | None,
+    smooth: SmoothSurface | None,
 ) -> FamilyFit:
     """Fit the family from earlier hypotheses; repeat a poor fit by a new search next to its hypotheses."""
     found = _fit(evidence, settings, seeds)
@@ -143,7 +143,7 @@ def _fit(evidence: ShapeEvidence, settings: FamilySettings, seeds: Sequence[Hypo
 
 
 def _with_predictions(
-    fit: FamilyFit, evidence: ShapeEvidence, smooth: SmoothFit | None, seconds: float
+    fit: FamilyFit, evidence: ShapeEvidence, smooth: SmoothSurface | None, seconds: float
 ) -> FamilyFit:
     """Predict left-out contacts where the smooth surface competes with a fit that is not yet rejected."""
     fit = replace(fit, seconds=seconds)

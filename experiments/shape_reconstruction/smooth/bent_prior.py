@@ -10,7 +10,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial.distance import cdist
 
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
-from experiments.shape_reconstruction.fits import SmoothFit, folds_of
+from experiments.shape_reconstruction.fits import SmoothSurface, folds_of
 from experiments.shape_reconstruction.prior.network import require_silhouette, shipped
 from experiments.shape_reconstruction.prior.surface import BLUR, closing_field, prior_deviation
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
@@ -47,7 +47,7 @@ class _Data:
     on_surface: IntArray  #: ``(n,)`` whether it is a place that was touched.
 
 
-def bend_prior(evidence: ShapeEvidence) -> SmoothFit:
+def bend_prior(evidence: ShapeEvidence) -> SmoothSurface:
     """Bend the single-view prior to the contacts, within the visual hull and the free space.
 
     The signed distance of the prior's surface is the mean of a Gaussian process; contacts correct it nearby.
@@ -80,7 +80,7 @@ def bend_prior(evidence: ShapeEvidence) -> SmoothFit:
     between = _covariance(body.mesh.vertices, data.points)
     explained = np.einsum("ij,ji->i", between, cho_solve(precision, between.T)) / AMPLITUDE**2
     unsure = max(prior_error, float(np.sqrt(np.mean(left_out**2))))
-    return SmoothFit(
+    return SmoothSurface(
         mesh=body.mesh,
         deviation=np.hypot(unsure * np.sqrt(np.clip(1.0 - explained, 0.0, 1.0)), READING),
         known_by=known,

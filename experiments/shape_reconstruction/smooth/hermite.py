@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.fits import SmoothFit
+from experiments.shape_reconstruction.fits import SmoothSurface
 from experiments.shape_reconstruction.smooth import knowledge
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
 from experiments.shape_reconstruction.smooth.free_space import (
@@ -99,7 +99,7 @@ class _Bounds:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RbfFit(SmoothFit):
+class RbfFit(SmoothSurface):
     """The zero surface of a thin-plate field."""
 
     amplitude: float  #: scale of the field's covariance.

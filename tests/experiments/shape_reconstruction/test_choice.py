@@ -9,7 +9,7 @@ import pytest
 from experiments.shape_reconstruction.choice import choose
 from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.kinds import draw_shape
-from experiments.shape_reconstruction.fits import FOLDS, FamilyFit, SmoothFit, folds_of
+from experiments.shape_reconstruction.fits import FOLDS, FamilyFit, SmoothSurface, folds_of
 from experiments.shape_reconstruction.thresholds import (
     ASSUMED_DEVIATION,
     MAX_BEYOND_CONTACTS,
@@ -33,9 +33,9 @@ def fit_of(contacts: int, error: float = 0.0, **changes: Any) -> FamilyFit:
     )
 
 
-def smooth_of(contacts: int, error: float = 0.0) -> SmoothFit:
+def smooth_of(contacts: int, error: float = 0.0) -> SmoothSurface:
     fit = fit_of(contacts)
-    return SmoothFit(
+    return SmoothSurface(
         fit.mesh, fit.deviation, fit.known_by, (), {}, (), 0.0, "smooth", left_out=np.full(contacts, error)
     )
 

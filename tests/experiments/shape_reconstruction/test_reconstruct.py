@@ -12,7 +12,7 @@ from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.kinds import draw_shape
 from experiments.shape_reconstruction.family.search import Hypothesis
 from experiments.shape_reconstruction.family.settings import CONTINUED, FamilySettings
-from experiments.shape_reconstruction.fits import FamilyFit, SmoothFit
+from experiments.shape_reconstruction.fits import FamilyFit, SmoothSurface
 from experiments.shape_reconstruction.prior.network import shipped, with_prior_points
 from experiments.shape_reconstruction.reconstruct import reconstruct, reconstruct_with_prior
 from experiments.shape_reconstruction.smooth.hermite import fit_rbf
@@ -128,7 +128,7 @@ def test_a_fit_beside_the_outline_is_searched_again(monkeypatch: pytest.MonkeyPa
     answer = reconstruct(part(8))
     assert len(family.seeds) == MAX_SEARCHES
     assert "of the outline" in answer.flags[-1]
-    assert isinstance(answer, SmoothFit)
+    assert isinstance(answer, SmoothSurface)
     assert answer.rejected is not None  # the next press begins at its hypotheses
     assert answer.details()["hypotheses_left"] == answer.rejected.mixture.as_json()
 
