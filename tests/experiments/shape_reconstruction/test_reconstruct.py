@@ -198,7 +198,7 @@ def test_of_two_smooth_surfaces_that_show_the_outline_the_better_prediction_is_k
 ) -> None:
     made = [replace(SMOOTH, flags=(str(k),), left_out=np.array([misfits[k]])) for k in (0, 1)]
     monkeypatch.setattr(reconstruction, "bend_prior", lambda _: made[0])
-    monkeypatch.setattr(reconstruction, "by_hermite", lambda *_, **__: made[1])
+    monkeypatch.setattr(reconstruction, "fit_rbf", lambda *_, **__: made[1])
     shown = iter(outlines)
     monkeypatch.setattr(reconstruction, "outline_error", lambda *_: next(shown))
     found = reconstruction._smooth(part(MIN_CONTACTS))
@@ -211,6 +211,6 @@ def test_where_no_smooth_surface_is_left_there_is_none(monkeypatch: pytest.Monke
         raise OutOfDomain("nothing is left")
 
     monkeypatch.setattr(reconstruction, "bend_prior", refuse)
-    monkeypatch.setattr(reconstruction, "by_hermite", refuse)
+    monkeypatch.setattr(reconstruction, "fit_rbf", refuse)
     assert reconstruction._smooth(part(2)) is None
     assert reconstruction._smooth(part(0)) is None
