@@ -36,7 +36,7 @@ MAX_PREDICTION_SIGMAS = 4.0  # deviations: between a contact and its prediction 
 # Stated deviation of the family: family/estimate
 MIN_DEVIATION = 0.6e-3  # m: of a surface that all hypotheses agree about
 SPREAD_FACTOR = 1.2  # factor: on the spread: few hypotheses are kept, and their costs are of one likelihood
-BLIND_FACTOR = 1.3  # factor: without a picture: few local minima are found (tuned on 24 development runs)
+BLIND_FACTOR = 1.3  # factor: without a picture: few local minima are found
 MISFIT_GAIN = 0.5  # per chi2: growth of the variance: a shape off its contacts is wrong elsewhere too
 UNDERSIDE_DEVIATION = 1.5e-3  # m: of the underside: feet, foot rings and hollows are common
 UNDERSIDE_HEIGHT = 5.0e-3  # m: above the support, below which neither gel nor camera reaches
