@@ -1,4 +1,4 @@
-"""What is known of an object of unknown shape: contacts, free space, its picture, its support.
+"""Readings of an object of unknown shape: contacts, free space, silhouette and support.
 
 Frame ``stand``: base, shifted to where the scene nominally puts the object on its support: z up, z = 0 at the
 support, axes as base has them. Everything here and every estimate is in it, in metres.
@@ -36,12 +36,12 @@ class GuardedTouch:
 
     @property
     def by_housing(self) -> bool:
-        """Whether the housing's face met the object: something did, and the gel shows nothing."""
+        """True if the housing touched the object: something stopped the press, and the gel shows nothing."""
         return self.stopped and not self.met
 
     @property
     def met(self) -> bool:
-        """Whether it touched anything."""
+        """True if the gel touched anything."""
         return len(self.points) > 0
 
     @property
@@ -53,7 +53,7 @@ class GuardedTouch:
 
     @property
     def normal_spread(self) -> float:
-        """Rad, roughly: root mean square of how far its normals are from their mean; zero of a plane's."""
+        """Root mean square angle between its normals and their mean, rad; zero for a plane."""
         apart = self.normals - self.mean_normal
         return float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))) if self.met else 0.0
 
@@ -149,5 +149,5 @@ class ShapeEvidence:
 
     @property
     def sighted(self) -> bool:
-        """Whether a camera saw something of the object."""
+        """True if a camera saw something of the object."""
         return self.look is not None and bool(self.look.mask.any())

@@ -156,10 +156,10 @@ HYPOTHESES, ROUNDS = 3, 10
 """Hypotheses that are fitted again without some contacts, and rounds of each fit."""
 
 AROUND = 24
-"""Pixels around the silhouette in which a surface is compared with it."""
+"""Margin around the silhouette in which a surface is compared with it, pixels."""
 
 _BORDER = 1.0
-"""Pixels that a rendered border and a mask's differ by besides the camera's error."""
+"""Distance between a rendered border and a mask's besides the camera's error, pixels."""
 
 
 def predict_left_out(fit: FamilyFit, evidence: ShapeEvidence) -> FloatArray:

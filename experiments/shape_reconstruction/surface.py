@@ -7,7 +7,7 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.mesh import Mesh
 
 UNOBSERVED, SEEN, TOUCHED = 0, 1, 2
-"""Of a vertex: neither touched nor at the border of the silhouette; seen; under a gel."""
+"""Sources of a vertex: neither touched nor at the border of the silhouette; seen; under a gel."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,7 +66,7 @@ def bent_box(q: FloatArray, box: FloatArray) -> None:
 
 @compiled
 def bent_distance(q: FloatArray, x: float, y: float, z: float) -> float:
-    """Metres from the surface, negative inside."""
+    """Compute the signed distance from the surface, m."""
     half = 0.5 * q[_LENGTH]
     along, aside = x, y
     if abs(q[_BEND]) > 1e-3:

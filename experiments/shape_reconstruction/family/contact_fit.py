@@ -27,7 +27,7 @@ _MOVED_POINTS = 8
 
 @dataclass(frozen=True, eq=False)
 class ContactFit:
-    """Of every contact, in their order."""
+    """Residuals of all contacts, in their order."""
 
     sums: FloatArray  #: ``(contacts,)`` sums of squares, in standard deviations.
     off: FloatArray  #: ``(contacts,)`` m rms between its points and the surface.
@@ -41,7 +41,7 @@ class ContactFit:
 
 
 def contact_fit(shape: FamilyShape, seen: FamilyEvidence) -> ContactFit:
-    """How the contacts fit a shape."""
+    """Compute the residuals of the contacts against a shape."""
     out, q = make_rows(seen), prepared_buffer()
     cost = evaluate(shape.code, shape.theta, seen, False, out, q)
     sums = np.asarray(contact_sums(seen, out.values))
@@ -88,21 +88,21 @@ def moved_points(
 
 
 POINTS = 12
-"""Of a contact, that are compared."""
+"""Points of a contact that are compared."""
 
 INDEPENDENT = 3.0
 """Points that a contact counts as: its neighbours err together."""
 
 POINT_SIGMA, NORMAL_SIGMA = 0.6e-3, float(np.radians(4.0))
-"""M and rad by which the nearest shape is off a contact whose pose is right."""
+"""Standard deviations of the nearest shape from a contact with a right pose, m and rad."""
 
 SHIFT_SIGMA = (1.0e-3, 1.0e-3, 2.0e-3)
-"""M along x, y and z of the gel that the nearest shape lies beside a real one at a contact."""
+"""Standard deviations of the offset of the nearest shape at a contact, along x, y and z of the gel, m."""
 
 TILT_SIGMA = float(np.radians(30.0))
 
 OUT, STEP = 1.5e-3, 1.0e-3
-"""M before the surface where a shape's slope is taken, and over which."""
+"""Distance outside the surface at which a slope is taken, and its step, m."""
 
 _PRIOR = np.array([*SHIFT_SIGMA, TILT_SIGMA, TILT_SIGMA])
 _STEPS = np.array([1e-4, 1e-4, 1e-4, 1e-2, 1e-2])
@@ -188,13 +188,13 @@ def _least(shape: FamilyShape, patch: _Patch, free: int) -> tuple[FloatArray, fl
 
 
 LENGTH = 15.0e-3
-"""M over which a displacement dies away."""
+"""Correlation length of a displacement, m."""
 
 AMPLITUDE = 3.0e-3
 """M: one standard deviation of a displacement where nothing was read."""
 
 FAR = 45.0e-3
-"""M over which a shape of the wrong class is off alike."""
+"""Correlation length of the error of a wrong class, m."""
 
 
 def displacement(

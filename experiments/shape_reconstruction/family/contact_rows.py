@@ -13,7 +13,7 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled, inlined
 
 NORMAL_STEP = 1.2e-3
-"""M between the places of which a shape's normal is taken."""
+"""Step of a shape's normal, m."""
 
 CLEAR_SIGMA = 0.4e-3
 """Standard deviation of a clear point, m: most of a contact's error is shared by all its points."""
@@ -83,7 +83,7 @@ def contact_offsets(seen: FamilyEvidence, points: FloatArray) -> FloatArray:
 def clear_row(
     code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, off: FloatArray, i: int
 ) -> float:
-    """How deep the shape reaches into the gel where that touched nothing, were it moved to the contact."""
+    """Compute the depth of the shape in the gel at a clear point, once it is moved to the contact."""
     j = seen.clear_touch[i]
     x, y, z = shift_by_gel(theta, seen.gel[j], seen.clear[i])
     return float(min(distance(code, q, False, x, y, z) - off[j], 0.0) / CLEAR_SIGMA)

@@ -27,7 +27,7 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
 
 _LEANT = 5.0e-3
-"""M by which a body may be out of its upright box, as it leans."""
+"""Distance by which a leaning body may be outside its upright box, m."""
 
 
 @compiled
@@ -73,7 +73,7 @@ def inside_depth(code: IntArray, q: FloatArray, x: float, y: float, z: float) ->
 
 @compiled
 def distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: float, z: float) -> float:
-    """Metres from the surface at a place in ``stand``, negative inside.
+    """Compute the signed distance from the surface at a point in ``stand``, m.
 
     ``filled`` closes what no ray of sight gets through, a vessel up to its rim, and what masks are filled at,
     the hole of a handle or of a ring.

@@ -38,7 +38,7 @@ from harness.basics.geometry import apply, inverse
 from harness.basics.mesh import Mesh
 
 SPREAD_OVER = 4
-"""Of the shapes drawn about each hypothesis, over which the spread at every vertex is taken."""
+"""Samples of each hypothesis from which the spread at every vertex is computed."""
 
 POINT_SIGMA = 1.6e-3
 """Standard deviation of each of a contact's eight points that a surface is moved to, m: they err together."""
@@ -131,7 +131,7 @@ def _at_stated_place(hypotheses: list[Hypothesis], evidence: ShapeEvidence) -> l
 
 
 def _by_picture_alone(found: FamilyFit, evidence: ShapeEvidence) -> FamilyFit:
-    """The same, as unsure of its depth along the line of sight as one outline leaves it."""
+    """Widen the deviation along the line of sight, which one outline does not limit."""
     sides = limited_sides(found.mesh, None, silhouette_of(evidence, np.zeros((0, 3))))
     beyond = beyond_deviation(found.mesh, found.known_by, sides, evidence.largest)
     return replace(

@@ -24,14 +24,13 @@ _RESOLVED = 1.2
 """Thickness of a wall, over a cell, from which on the grid shows no hole in it."""
 
 _FINER = (1.0, 0.5, 0.25)
-"""Of the cell, tried in turn until a corner of the grid is inside of the body."""
+"""Fractions of the cell, tried in turn until a corner of the grid is inside the body."""
 
 _SLIVER = 0.3
-"""Of a cell, half the thickness of what is thinner than that."""
+"""Half the thickness of a part thinner than a cell, in cells."""
 
 BELOW = 5.0e-3
-"""M below the support's nominal height from where on nothing is of an answer: a handle or a spout of a
-hypothesis may dip into it, where no reading is."""
+"""Depth below the nominal support at which an answer is cut, m: a handle of a hypothesis may dip into it."""
 
 _WEIGHT = 0.03
 """Below it a hypothesis does not move the median."""
@@ -77,13 +76,13 @@ def median_surface(mixture: Mixture, pitch: float, contacts: FloatArray | None =
 
 
 def _wall(shape: FamilyShape) -> float:
-    """M of a hollow body's wall and floor, the thinner; infinite of any other, which has none."""
+    """Return the smaller thickness of wall and floor, m; infinite for a solid body."""
     walls = list(kind_of(shape.code).traits(shape.code).walls)
     return float(np.exp(shape.theta[walls].min())) if walls else np.inf
 
 
 def _thickened(shape: FamilyShape, least: float) -> FamilyShape:
-    """The same, its wall and floor at least so many m thick; its outside as it was."""
+    """Return the shape with wall and floor at least so thick, m; its outside is unchanged."""
     if _wall(shape) >= least:
         return shape
     theta, walls = shape.theta.copy(), list(kind_of(shape.code).traits(shape.code).walls)

@@ -17,13 +17,13 @@ from experiments.shape_reconstruction.family.kinds import kind_of
 from harness.basics.arrays import FloatArray, IntArray
 
 TILT = float(np.radians(0.8))
-"""Rad per axis that an object on its support leans by."""
+"""Standard deviation per axis of the tilt of an object on its support, rad."""
 
 GEL_OFF = (0.6e-3, 0.6e-3, 0.4e-3)
-"""M in the gel's frame by which a calibrated gel is off its believed place, all through a run."""
+"""Standard deviations of the offset of a calibrated gel throughout a run, in its frame, m."""
 
 OUTLINE_BIAS, OUTLINE_OFF = -0.15, 0.3
-"""Pixels by which masks reach beyond objects: a pixel counts where the object covers about a third of it."""
+"""Mean and deviation of the distance of masks beyond objects, pixels: a third of a pixel suffices."""
 
 SMOOTHNESS = 0.10
 """Standard deviation of the second difference of a section's deviation from its sample."""

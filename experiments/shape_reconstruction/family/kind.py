@@ -41,7 +41,7 @@ Draw = Callable[[Random, IntArray, FloatArray], None]
 
 @dataclass(frozen=True)
 class Traits:
-    """What the parts of a shape imply. Slots are indices into its vector."""
+    """Properties that follow from the parts of a shape. Slots are indices into its vector."""
 
     has_yaw: bool = True  #: whether a rotation about the vertical changes it.
     yaw_factor: int = 1  #: factor on the number of yaws that a sample is tried at.

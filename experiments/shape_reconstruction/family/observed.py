@@ -25,10 +25,10 @@ PRIOR_POINTS, PRIOR_WEIGHT = 48, 8.0
 """Points of the single-view prior that a shape is compared with; independent points that they count as."""
 
 MODEL = 0.7e-3
-"""M by which the nearest shape of the family is off a real surface, one standard deviation."""
+"""Standard deviation of the nearest shape of the family from a real surface, m."""
 
 NORMAL_MODEL = float(np.radians(6.0))
-"""Rad by which a normal of that shape is off the surface's, one standard deviation."""
+"""Standard deviation of its normals from those of the surface, rad."""
 
 NORMAL_SPREAD_FACTOR = 0.5
 """Error of the mean normal over the spread of a contact's normals, which is wide at an edge."""
@@ -63,7 +63,7 @@ class SightRays(NamedTuple):
 
 
 class FamilyEvidence(NamedTuple):
-    """What the compiled residuals read."""
+    """Readings as the compiled residuals take them."""
 
     points: FloatArray  #: ``(n, 3)`` m of the surface.
     touch: IntArray  #: ``(n,)`` which contact each is of.
@@ -186,12 +186,12 @@ OUTLINE_WEIGHT = 60.0
 """Independent readings that all grazing rays together count as at most: neighbours err alike."""
 
 GAIN = 0.5
-"""Of a ray that passes the mask, by pixel from it."""
+"""Growth of a factor on distances per pixel from the mask."""
 
 _GRAZING = (36, 120)
 _MEETING = (12, 60)
 _PASSING = ((2.0, 14, 70), (4.0, 12, 60), (9.0, 10, 50), (20.0, 8, 40), (45.0, 5, 30), (90.0, 3, 20))
-"""Pixels from the mask, and how many rays there: for ranking, and for fitting."""
+"""Distances from the mask, pixels, and numbers of rays there: for ranking and for fitting."""
 
 _STEPS = (5.0e-3, 2.5e-3)
 """M between places on a ray, for ranking and for fitting: a cup then seems 0.1 mm too far from it
@@ -202,7 +202,7 @@ _CLEAR = 2
 
 
 def no_rays() -> SightRays:
-    """Of no picture."""
+    """Return the rays of no picture."""
     zero, empty = np.zeros(3), np.empty(0)
     kinds = np.empty(0, np.int64)
     return SightRays(

@@ -42,12 +42,12 @@ class Guides:
 
     @property
     def sighted(self) -> bool:
-        """Whether there is a silhouette."""
+        """True if there is a silhouette."""
         return len(self.outline) > 0
 
     @property
     def touched(self) -> bool:
-        """Whether there are contacts."""
+        """True if there are contacts."""
         return len(self.middles) > 0
 
     def on_level(self, height: float) -> FloatArray:
@@ -150,7 +150,7 @@ _LEVEL = 0.5
 """Vertical part of a normal below which a contact is on a side."""
 
 _REACHES = (0.0, 0.02, 0.04, 0.07)
-"""M behind a side contact that the middle may be."""
+"""Distances of the centre behind a side contact, m."""
 
 
 def guides_of(evidence: ShapeEvidence) -> Guides:

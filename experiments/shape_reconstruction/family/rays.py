@@ -24,13 +24,13 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled, inlined
 
 RAY_MODEL = 0.5e-3
-"""M by which the outline of the nearest shape is off a real one."""
+"""Standard deviation of the outline of the nearest shape from a real one, m."""
 
 PIXELS = 0.5
-"""Of an outline's deviation: one standard deviation of where a mask ends."""
+"""Standard deviation of the border of a mask, pixels."""
 
 _GOLDEN, _SECTIONS = 0.6180339887498949, 9
-"""Of a part of a ray, what is kept of it at each section, and sections: of 5 mm, 0.04 mm are left."""
+"""Fraction of a segment that each golden section keeps, and sections: 5 mm become 0.04 mm."""
 
 _SIDE, _LEVEL = 0.15e-3, 0.05
 """Distance from a ray's nearest place at which slopes are taken, m; slopes from which on it is at an edge."""
@@ -53,7 +53,7 @@ def ray_direction(theta: FloatArray, rays: SightRays, i: int, towards: FloatArra
 
 @inlined
 def ray_sigma(rays: SightRays) -> float:
-    """M that a ray passes the shape at, one standard deviation."""
+    """Compute one standard deviation of the distance of a ray from the shape, m."""
     return float(np.hypot(PIXELS * rays.pixel, RAY_MODEL))
 
 
@@ -97,7 +97,7 @@ def hold_ray(
 def held_distance(
     code: IntArray, q: FloatArray, origin: FloatArray, towards: FloatArray, held: FloatArray
 ) -> float:
-    """M from a shape at a held ray's places, their mean by its share."""
+    """Compute the weighted mean distance from a shape at the two places of a held ray, m."""
     d = (1.0 - held[2]) * _on_ray(code, q, origin, towards, held[0])
     return float(d + held[2] * _on_ray(code, q, origin, towards, held[1]) if held[2] > 0.0 else d)
 
@@ -112,7 +112,7 @@ def _on_ray(code: IntArray, q: FloatArray, origin: FloatArray, towards: FloatArr
 def _least_on_ray(
     code: IntArray, q: FloatArray, origin: FloatArray, towards: FloatArray, low: float, high: float
 ) -> float:
-    """Where between two places on a ray the distance is least, by golden sections."""
+    """Find the place of least distance between two places on a ray by golden sections."""
     a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
     at_a, at_b = _on_ray(code, q, origin, towards, a), _on_ray(code, q, origin, towards, b)
     for _ in range(_SECTIONS):
@@ -129,7 +129,7 @@ def _least_on_ray(
 
 _MOST = 120
 _BEYOND = 10.0e-3
-"""M above and below the shape at which a ray is still followed: it may pass its rim."""
+"""Distance above and below the shape at which a ray is still followed, m: it may pass the rim."""
 
 _SURE, _FINE = 0.7, 0.5e-3
 """Fraction of a distance that a line is followed by, as it may be too great at corners; least step, m."""

@@ -1,4 +1,4 @@
-"""How a shape of the family disagrees with the readings: weighted residuals, and the cost they add up to.
+"""Weighted residuals of a shape against the readings, and their cost.
 
 One likelihood for touch, sight and both: what was not read has no rows. Rows: of each contact its points, its
 normal and the places where its gel touched nothing, every housing that met it, every free place, every ray,
@@ -48,7 +48,7 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled, inlined
 
 FREE_SIGMA = 1.0e-3
-"""M by which the sensor's housing may seem to be inside the object."""
+"""Standard deviation of the housing's depth inside the object, m."""
 
 PRIOR_SIGMA = 5.0e-3
 """Standard deviation of a point of the single-view prior, m: a little more than on held-out shapes."""
@@ -149,7 +149,7 @@ def _evaluate_rays(
 
 @compiled
 def free_row(code: IntArray, seen: FamilyEvidence, q: FloatArray, i: int) -> float:
-    """How deep a place is in the shape where the sensor was, in standard deviations; zero outside."""
+    """Compute the depth of a free place in the shape, in standard deviations; zero outside."""
     p = seen.free[i]
     return float(inside_depth(code, q, p[0], p[1], p[2]) / FREE_SIGMA)
 
@@ -192,7 +192,7 @@ def prepared_buffer() -> FloatArray:
 
 
 NUDGE = 1.0e-5
-"""Of a direction, over which a difference is taken: m, rad or logarithm."""
+"""Step of a finite difference: m, rad or logarithm."""
 
 _MOVES = (X, Y, LIFT)
 """The body's three moves along the axes of ``stand``."""

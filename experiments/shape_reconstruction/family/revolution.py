@@ -104,7 +104,7 @@ def _mug(random: Random, code: IntArray, theta: FloatArray) -> None:
 
 
 def _dish(random: Random, radius: float, foot: float) -> tuple[FloatArray, FloatArray]:
-    """Radii and shares of the height along a curve that leaves the foot outward and ends upright or not."""
+    """Sample radii, and relative heights, along a curve that leaves the foot outward."""
     turn = 0.5 * np.pi * _EVEN * random.uniform(0.5, 1.0)
     out, up = np.sin(turn) / np.sin(turn[-1]), (1.0 - np.cos(turn)) / (1.0 - np.cos(turn[-1]))
     return radius * (foot + (1.0 - foot) * out), up

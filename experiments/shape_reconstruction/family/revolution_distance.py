@@ -72,7 +72,7 @@ _SLIGHT = 0.25
 """Least slope that a distance is computed with: beside a kink of a flat side it would be none."""
 
 _SLOPE, _INVERSE = 42, 48
-"""Of the side's pieces: radius over height, and one over the squared length."""
+"""Offsets of the pieces of the side: radius over height, and one over the squared length."""
 
 
 @compiled
@@ -111,7 +111,7 @@ def prepare_revolution(code: IntArray, own: FloatArray, q: FloatArray) -> None:
 
 @compiled
 def _reach_of(code: IntArray, q: FloatArray, z: float) -> float:
-    """How far the wall is from the axis, along x, at a height."""
+    """Compute the distance of the wall from the axis along x, at a height, m."""
     core = q[_BX] if code[PLAN] == CORED else 0.0
     if z <= q[_Z]:
         return float(core + q[_R])
@@ -153,7 +153,7 @@ def revolution_box(code: IntArray, q: FloatArray, box: FloatArray) -> None:
 
 @compiled
 def revolution_distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: float, z: float) -> float:
-    """Metres from the body's surface, negative inside.
+    """Compute the signed distance from the surface, m.
 
     ``filled`` closes a handle's hole, as masks do, and a vessel up to its rim, which no ray of sight gets
     through: how far a ray goes in is then not how thick the wall is.

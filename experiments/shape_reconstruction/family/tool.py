@@ -87,7 +87,7 @@ def tool_box(code: IntArray, q: FloatArray, box: FloatArray) -> None:
 
 @compiled
 def tool_distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: float, z: float) -> float:
-    """Metres from the tool's surface, negative inside; ``filled`` closes its holes, as masks do."""
+    """Compute the signed distance from the surface, m; ``filled`` closes its holes, as masks do."""
     up = abs(z - q[_MIDDLE])
     # The shaft is a trapezium with half widths that differ at its ends.
     half, slope = q[_HALF], 0.5 * (q[_WB] - q[_WA]) / q[_HALF]

@@ -20,7 +20,7 @@ PITCH = 3.0e-3
 """Pitch of the grid, m."""
 
 GAP = 6.0
-"""Radius of the closing ball over the median distance of neighbouring points. Points of a glance are a few
+"""Radius of the closing ball over the median distance of neighbouring points. The predicted points are a few
 millimetres off the surface: a smaller ball finds holes between them."""
 
 BLUR = 1.0

@@ -10,7 +10,7 @@ from harness.basics.errors import FitRefused
 from harness.sim.solid.surface_samples import thin
 
 SPACING = 6.0e-3
-"""M between samples that face the same way."""
+"""Smallest distance between samples that face the same way, m."""
 
 MOST = 260
 """Samples: a surface through them is solved in a tenth of a second."""

@@ -11,14 +11,14 @@ from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply, inverse
 
 CLEARANCE = 1.5e-3
-"""M inside a sensor's housing that the object may seem to be: errors of pose and of the housing's shape."""
+"""Depth in the housing that the object may seem to have, m: errors of pose and of the housing's shape."""
 
 SHIFTS = 3.0
 """Standard deviations of the camera that its picture is shifted by at most."""
 
 _STEP = 0.5
 _CONTACT_BEYOND = 0.7
-"""Pixels, one standard deviation of how far a place of the object seems to be beside its silhouette."""
+"""Standard deviation of the distance of a contact from the silhouette, pixels."""
 
 
 def sensor_depth(evidence: ShapeEvidence, points: FloatArray) -> FloatArray:
@@ -77,7 +77,7 @@ class Silhouette:
         return self._read(self.pixels(points)[0])
 
     def outside_metres(self, points: FloatArray) -> FloatArray:
-        """The same in m at each point's own depth."""
+        """Return ``(n,)`` distances outside the silhouette at each point's depth, m; below 0 within it."""
         pixels, depth = self.pixels(points)
         return self._read(pixels) * depth / self.look.focal_length
 
@@ -88,7 +88,7 @@ class Silhouette:
 
 
 def shift_sigma(look: SeenMask, depth: float) -> float:
-    """Pixels, one standard deviation of where a place at ``depth`` m appears, by the camera's errors."""
+    """Compute one standard deviation of the image position of a point at ``depth`` m, pixels."""
     turned = look.focal_length * look.rotation_error
     return float(np.hypot(turned, look.focal_length * look.position_error / depth))
 

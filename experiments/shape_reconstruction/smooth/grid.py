@@ -14,7 +14,7 @@ from harness.basics.faces.isosurface import isosurface
 from harness.basics.mesh import Mesh
 
 MOST_CORNERS = 200_000
-"""Of a grid: beyond it the cells are made larger."""
+"""Most corners of a grid: above it the cells are larger."""
 
 BAND = 3.0
 """Pitches from zero, within which every corner is asked."""

@@ -35,17 +35,17 @@ from experiments.shape_reconstruction.smooth.thin_plate import SurfaceData, Thin
 from harness.basics.arrays import FloatArray
 
 PITCH = 4.0e-3
-"""M between corners of the grid on which the surface is found."""
+"""Pitch of the grid on which the surface is extracted, m."""
 
 MARGIN = 10.0e-3
-"""M beyond the contacts that the object may reach."""
+"""Margin of the grid around the contacts, m."""
 
 SLOPE, ENTERED_SLOPE = 0.3, 0.15
 """Largest distance beyond the hull of the contacts per m from the nearest contact; the same of a round body
 that the sensor entered, whose contacts are rotated about its axis."""
 
 FOOT = 0.6
-"""Of the contacts' width that of the object at its support is, within the hull."""
+"""Width of the hull at the support over that of the contacts."""
 
 READING = 0.7e-3
 """M, one standard deviation of any part of the surface at least: errors that all contacts share."""
@@ -61,9 +61,9 @@ _NEAR = 2.0 * PITCH
 
 @dataclass(frozen=True, eq=False)
 class _Bounds:
-    """Where the object is at most: not beyond the hull of ``(n, 3)`` m of its places, nor in free space.
+    """Largest extent of the object: near the hull of ``(n, 3)`` points, m, and outside free space.
 
-    Of a round body free space is turned about its axis as well.
+    Free space is rotated about the axis of a round body.
     """
 
     evidence: ShapeEvidence
@@ -116,7 +116,7 @@ class RbfFit(SmoothSurface):
 
 
 def fit_rbf(evidence: ShapeEvidence, symmetric: bool = True) -> RbfFit:
-    """The zero of a thin-plate field through the contacts, cut by all that is known to be free.
+    """Fit a thin-plate field through the contacts, and cut its zero surface by the free space.
 
     Args:
         evidence: one contact or more.
@@ -231,7 +231,7 @@ SIGMA = 2.5e-3
 
 NORMAL_SIGMA = 0.3
 APART = 10.0e-3
-"""M from any contact, within which the contact knows better."""
+"""Distance from a contact within which no such point is used, m."""
 
 _DEPTHS = 40
 
@@ -243,7 +243,7 @@ def rim_data(
     low: FloatArray,
     high: FloatArray,
 ) -> SurfaceData:
-    """Where a field comes nearest to the rays of the border, as data of the surface.
+    """Find the points where a field is smallest along rays of the border, as data of the surface.
 
     Args:
         silhouette: of the picture.

@@ -26,7 +26,7 @@ def known_by(mesh: Mesh, samples: ContactSamples | None, silhouette: Silhouette 
 
 
 def limited_sides(mesh: Mesh, samples: ContactSamples | None, silhouette: Silhouette | None) -> Sides:
-    """Whether a reading limits each side, by the name of its axis and -1 or 1.
+    """Find which sides a reading limits, by the name of the axis and -1 or 1.
 
     A side is limited by a contact near that end which looks that way, by the silhouette where the camera
     looks across it, and the lowest by the support.

@@ -1,4 +1,4 @@
-"""Whether contacts are those of a body turned about the vertical, and where else it then has its surface.
+"""Find a vertical axis of revolution that contacts agree on, and rotate contacts and free space about it.
 
 A normal's line meets the axis, and places of different touches that face alike at one height lie on one
 profile, wherever they are around it. An axis is that which the normals agree on and then the profile; it is
@@ -19,10 +19,10 @@ from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.geometry import rotation_about
 
 COPIES = 16
-"""Of each place, around the axis."""
+"""Copies of each point around the axis."""
 
 APART = 12.0e-3
-"""M from any contact, within which the contact knows better."""
+"""Distance from a contact within which no copy is made, m."""
 
 _HORIZONTAL = 0.25
 _HEIGHT, _NEAR, _AROUND, _ALIKE = 8.0e-3, 12.0e-3, 25.0e-3, 0.9
@@ -150,10 +150,10 @@ def _profile_errors(side: ContactSamples, centre: FloatArray) -> tuple[BoolArray
 
 
 SLACK = 4.0e-3
-"""M inside turned room that the body may seem to be: errors of the axis, bodies that are not quite round."""
+"""Depth in rotated free space that the body may seem to have, m: errors of the axis and of its roundness."""
 
 BELOW = 15.0e-3
-"""M below the highest contact, from which on a touch went down into the body or beside its upper part."""
+"""Depth below the highest contact from which on a touch entered the body or passed its upper part, m."""
 
 PITCH, ANGLES = 4.0e-3, 24
 _DOWNWARD = 0.8
@@ -162,7 +162,7 @@ _ROOM_MARGIN = 20.0e-3
 
 @dataclass(frozen=True, eq=False)
 class RotatedSpace:
-    """What is free about an axis, over the distance from it and the height."""
+    """Free space about an axis, by distance from it and height."""
 
     centre: FloatArray  #: ``(2,)`` m, of the axis in ``stand``.
     depth: FloatArray

@@ -30,7 +30,7 @@ rings and rods)."""
 
 @dataclass(frozen=True, eq=False)
 class SurfaceData:
-    """What is known of a field ``f`` that is 0 on a surface and grows outward by a metre a metre."""
+    """Observations of a field ``f`` that is 0 on a surface and grows outward with slope one."""
 
     points: FloatArray  #: ``(n, 3)`` m, where ``values`` are known.
     values: FloatArray  #: ``(n,)`` m.
