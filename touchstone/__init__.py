@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from harness import api
 
 if TYPE_CHECKING:
+    from calibration.taxim.result import TaximResult, calibrate_taxim
     from harness.api import (
         AudioBuild,
         ComparedVision,
@@ -35,11 +36,13 @@ __all__ = [
     "PressDepth",
     "RenderedAudio",
     "RenderedVision",
+    "TaximResult",
     "TouchBuild",
     "VerifiedObject",
     "VisionBuild",
     "answer",
     "build_objectfile",
+    "calibrate_taxim",
     "compare_vision",
     "depth",
     "load_object",

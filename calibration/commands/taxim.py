@@ -1,24 +1,17 @@
 """``touchstone calibrate taxim``: a tactile camera from ball presses, by the arm or in pictures."""
 
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
-from calibration.commands.taxim_answer import answer_of, doubts, say, scale_answer, write_published
 from harness.basics.errors import WrongUse
 from harness.commands import options
-from harness.commands.output import CONSOLE, emit, resumable, step_progress, stopped, warn
+from harness.commands.output import CONSOLE, print_result, resumable, step_progress, stopped
 
 if TYPE_CHECKING:
-    from calibration.taxim.arm.moves import ArmScale
-    from calibration.taxim.arm.record import ArmPresses
-    from calibration.taxim.mark_free import Identity
-    from calibration.taxim.pictures import Channels, Pictures
-    from harness.bench.sensor import TactileSensor
+    from calibration.taxim.pictures import Channels
     from harness.recording.recording import Recording
 
 _SAME_SHAPE = 0.02
@@ -186,12 +179,8 @@ def taxim(
 
     Or: touchstone calibrate taxim presses/ --ball-radius 2mm --pitch 0.1245mm --report page/
     """
-    from calibration.taxim.mark_free import calibrate
-    from calibration.taxim.pictures import squared
+    from calibration.taxim.result import calibrate_taxim
     from harness.basics.quantities import LENGTH
-    from harness.basics.whole_file import write_text_whole
-    from harness.sim.optics.lit_calibration import read_calibration
-    from harness.sim.optics.tactile_calibration import save_calibration
 
     options.require_files(
         ("--out", out, ""), ("--polycalib", polycalib, ""), ("--shadow-table", shadow_table, "")
@@ -213,127 +202,25 @@ def taxim(
     source = folder if folder is not None else pressed(wanted, json)
     if source is None:
         return 130
-    arm, scale, taken = _read(source, background, channels)
-    pictures = squared(taken, aspect if aspect is not None else 1.0 if scale is None else scale.aspect_taken)
-    who = _identity(sensor, serial, licence, pitch, wanted.ball_radius, arm, scale, pictures)
-    known = None if like is None else read_calibration(like)
-    made = calibrate(pictures, who, use_marks=marks, like=known)
-    artefact = out
-    if artefact is None:
-        by_pictures = Path(f"{source.resolve().stem}_calibration.npz")
-        artefact = by_pictures if arm is None else source / "fitted.npz"
-    save_calibration(made.calibration, artefact)
-    write_published(made, polycalib, shadow_table)
-    page = None
-    if report is None and arm is not None:
-        report = source / "report"
-    if report is not None:
-        from calibration.taxim.report import write_report
-
-        page = write_report(made, pictures, f"{who.sensor}, {source.name}", report, scale, arm)
-    answer = {
-        **answer_of(made, artefact, polycalib, page),
-        **scale_answer(scale, arm),
-        "pitch_m": who.pitch,
-        "made_square_by": pictures.aspect,
-    }
-    if scale is not None and arm is not None:
-        # The artefact's format has a place for the pitch alone.
-        measured = {"schema": 1, **answer["scale"], "made_square_by": pictures.aspect}
-        text = dumps(measured, indent=1, allow_nan=False) + "\n"
-        write_text_whole(artefact.with_name(f"{artefact.stem}.scale.json"), text)
-        for doubt in doubts(scale, arm, pictures.aspect):
-            warn(doubt)
-    if json:
-        emit(answer)
-    else:
-        say(made, answer, scale)
-    return 0
-
-
-def _read(
-    source: Path, background: Path | None, channels: str | None
-) -> "tuple[ArmPresses | None, ArmScale | None, Pictures]":
-    """Pictures and, where an arm made them, what its moves say."""
-    from calibration.taxim.arm.record import NAME, read_arm_run
-    from calibration.taxim.pictures import read_pictures
-    from harness.recording.recording import Recording
-
-    if not ((source / "run.json").is_file() and Recording(source).header.experiment == NAME):
-        return None, None, read_pictures(source, background, _channels(channels))
-    if background is not None or channels is not None:
-        raise WrongUse("--background and --channels are of pictures; a run of the arm has both in its folder")
-    arm = read_arm_run(source)
-    return arm, arm.scale(), arm.pictures
-
-
-def _identity(
-    sensor: str | None,
-    serial: str,
-    licence: str,
-    pitch: str | None,
-    ball_radius: float | None,
-    arm: "ArmPresses | None",
-    scale: "ArmScale | None",
-    pictures: "Pictures",
-) -> "Identity":
-    """Return the sensor's identity with its pitch: as given, else by the arm, else of the sensor's file."""
-    from calibration.taxim.mark_free import Identity
-    from harness.basics.errors import WrongUse
-    from harness.basics.quantities import LENGTH
-    from harness.bench.sensor import described_sensor, shipped_sensors
-
-    recorded = None if arm is None else arm.ball_radius
-    if ball_radius is None and recorded is None:
-        raise WrongUse("--ball-radius is missing: the radius of the ball that was pressed, as 2mm")
-    if ball_radius is not None and recorded is not None and abs(ball_radius / recorded - 1.0) > 1e-6:
-        raise WrongUse(
-            f"--ball-radius {1e3 * ball_radius:g} mm: this run was made with a ball of {1e3 * recorded:g} "
-            "mm; leave it out"
-        )
-    stated = options.positive("--pitch", pitch, LENGTH)
-    described = None
-    # Any other name is the sensor's own, without a description.
-    if sensor is not None and (
-        sensor in shipped_sensors() or Path(sensor).suffix == ".toml" or Path(sensor).is_file()
-    ):
-        described = described_sensor(sensor).sensor
-    if stated is not None:
-        known = stated
-    elif scale is not None:
-        known = scale.pitch.value
-    else:
-        known = _pitch_of_pictures(described, pictures)
-    name = sensor if described is None else described.name
-    return Identity(
-        sensor=name or ("GelSight" if arm is None else arm.sensor),
-        serial=serial if arm is None or serial != "unknown" else arm.serial or serial,
+    calibrated = calibrate_taxim(
+        source,
+        ball_radius=wanted.ball_radius,
+        pitch=options.positive("--pitch", pitch, LENGTH),
+        aspect=aspect,
+        sensor=sensor,
+        serial=serial,
         licence=licence,
-        date=datetime.now(UTC).date().isoformat(),
-        pitch=known,
-        ball_radius=recorded if recorded is not None else ball_radius or 0.0,
+        background=background,
+        channels=_channels(channels),
+        like=like,
+        use_marks=marks,
+        out=out,
+        polycalib=polycalib,
+        shadow_table=shadow_table,
+        report=report,
     )
-
-
-def _pitch_of_pictures(sensor: "TactileSensor | None", pictures: "Pictures") -> float:
-    """Return m per pixel of pictures that may be a reduced version of the sensor's own.
-
-    Raises:
-        WrongUse: the pictures are cropped, or another sensor's.
-    """
-    from harness.basics.errors import WrongUse
-    from harness.bench.sensor import GELSIGHT_R15
-
-    if sensor is None:
-        return GELSIGHT_R15.pitch
-    rows, columns = pictures.background.shape[:2]
-    down, right = sensor.rows / rows, sensor.columns / columns
-    if abs(down / right - 1.0) > _SAME_SHAPE:
-        raise WrongUse(
-            f"the pictures are {columns} x {rows} pixels and {sensor.name} has {sensor.columns} x "
-            f"{sensor.rows}: they are not its whole picture; give --pitch, or the sensor that took them"
-        )
-    return float(sensor.pitch * (down * right) ** 0.5)
+    print_result(calibrated, json)
+    return 0
 
 
 def _channels(text: str | None) -> "Channels | None":

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.commands.taxim_answer import NO_MOVES, doubts, scale_answer
 from calibration.taxim.arm.record import read_arm_run
+from calibration.taxim.result import MeasuredScale, scale_notes
 from harness.cli import invoke
 from harness.recording.recording import Recording
 from tests.support.arm_presses import begun, performed
@@ -48,16 +48,9 @@ def test_a_run_keeps_its_ball_and_its_order_of_colours(
     assert "--channels" in refused([str(done.folder), "--channels", "bgr"], capsys)
 
 
-def test_pictures_alone_say_that_they_cannot_tell_the_scale() -> None:
-    answer = scale_answer(None, None)
-    assert answer == {"scale": None, "scale_reason": NO_MOVES}
-    assert "--station" in NO_MOVES
-
-
 def test_every_number_of_the_answer_has_its_error(done: Recording) -> None:
     run = read_arm_run(done.folder)
-    answer = json.loads(json.dumps(scale_answer(run.scale(), run), allow_nan=False))
-    scale = answer["scale"]
+    scale = vars(MeasuredScale.of(run.scale(), run))
     for name, unit in (
         ("pitch", "_m"),
         ("wide", "_m"),
@@ -69,17 +62,16 @@ def test_every_number_of_the_answer_has_its_error(done: Recording) -> None:
         assert scale[f"{name}_within95{unit}"] > scale[f"{name}_sigma{unit}"] > 0.0
     assert scale["pitch_m"] == pytest.approx(0.1245e-3, rel=0.05)
     assert np.array(scale["gel_from_pixels_m"]).shape == (2, 2)
-    assert answer["scale_reason"] is None
     assert not run.scale().off
 
 
 def test_it_is_told_that_pictures_were_made_square_and_when_another_aspect_was_taken(done: Recording) -> None:
     run = read_arm_run(done.folder)
     scale = run.scale()
-    assert not any(f"{scale.aspect.value:.4f}" in said for said in doubts(scale, run, 1.0))
-    assert any("1.0300" in said for said in doubts(scale, run, 1.03))
+    assert not any(f"{scale.aspect.value:.4f}" in said for said in scale_notes(scale, run, 1.0))
+    assert any("1.0300" in said for said in scale_notes(scale, run, 1.03))
     far = scale.aspect.value + 2.0 * scale.aspect.within95
-    assert any("--aspect" in said for said in doubts(scale, run, far))
+    assert any("--aspect" in said for said in scale_notes(scale, run, far))
 
 
 def test_a_finished_run_is_resumed_without_a_bench(
@@ -91,6 +83,7 @@ def test_a_finished_run_is_resumed_without_a_bench(
     assert invoke(["calibrate", "taxim", "--resume", str(folder), "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["pitch_m"] == answer["scale"]["pitch_m"]
+    assert answer["scale_reason"] is None
     assert answer["presses"] + len(answer["refused"]) == 16
     assert answer["psnr_contact_db"] > answer["psnr_untouched_db"] + 12.0
     assert Path(answer["artefact"]) == folder / "fitted.npz"

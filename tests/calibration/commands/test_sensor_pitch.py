@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.commands.taxim import _identity
 from calibration.taxim.pictures import Pictures
+from calibration.taxim.result import identify
 from harness.basics.errors import WrongUse
 from harness.bench.sensor import sensor_path
 from tests.samples.drawn_presses import press_set
@@ -19,8 +19,8 @@ def _pictures(rows: int, columns: int) -> Pictures:
     return press_set([rest, rest], rest)
 
 
-def _pitch(sensor: str | None, rows: int, columns: int, pitch: str | None = None) -> float:
-    who = _identity(sensor, "unknown", "", pitch, 2e-3, None, None, _pictures(rows, columns))
+def _pitch(sensor: str | None, rows: int, columns: int, pitch: float | None = None) -> float:
+    who = identify(sensor, "unknown", "", pitch, 2e-3, None, None, _pictures(rows, columns))
     return float(who.pitch)
 
 
@@ -35,7 +35,7 @@ def test_the_pitch_is_the_sensors_for_any_reduction_of_its_pictures(
 
 
 def test_a_stated_pitch_and_a_name_of_no_file_are_used_as_they_are() -> None:
-    assert _pitch("gelsight-mini", 240, 320, "0.05mm") == pytest.approx(0.05e-3)
+    assert _pitch("gelsight-mini", 240, 320, 0.05e-3) == pytest.approx(0.05e-3)
     assert _pitch("my gel", 240, 320) == pytest.approx(0.1245e-3)
 
 

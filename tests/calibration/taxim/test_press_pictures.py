@@ -172,6 +172,8 @@ def test_the_command_writes_artefact_table_and_page(
     options = ["--ball-radius", "1.2mm", "--pitch", "0.1mm", "--report", "page", "--polycalib", "poly.npz"]
     assert cli.invoke(["calibrate", "taxim", str(folder), *options, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
+    assert answer["scale"] is None
+    assert "--station" in answer["scale_reason"]
     made = read_calibration(Path(answer["artefact"]))
     assert isinstance(made, LitCalibration)
     assert made.sha256 == answer["sha256"]
