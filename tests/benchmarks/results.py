@@ -56,7 +56,7 @@ def finish_figure(
             one with its extremes as ``1.6 (1.5 to 1.7)``, is kept as numbers.
         command: line that measured the rows; this program's own by default.
     """
-    heads = tuple(_column(text) for text in columns.split(";"))
+    heads = tuple(_parse_column(text) for text in columns.split(";"))
     formats = [head.format or ".3g" for head in heads]
     kept = tuple(tuple(_round(*each) for each in zip(row, formats, strict=True)) for row in rows)
     old = read_page(page)
@@ -70,16 +70,16 @@ def finish_figure(
     update = {
         "columns": heads,
         "rows": kept,
-        "command": command or _command(),
-        "commit": _git("describe", "--always", "--dirty", "--exclude=*"),
+        "command": command or _read_command(),
+        "commit": _run_git("describe", "--always", "--dirty", "--exclude=*"),
         "date": datetime.now(UTC).date().isoformat(),
-        "machine": _machine(),
+        "machine": _describe_machine(),
     }
     figures = tuple(each.model_copy(update=update) if each.id == figure else each for each in old.figures)
     write_page(page, old.model_copy(update={"figures": figures}))
 
 
-def _column(text: str) -> Column:
+def _parse_column(text: str) -> Column:
     found = re.fullmatch(r"\s*(.*?)(?: \[(.*)\])?(?: (#?\+?\.\d[efg]))?\s*", text)
     assert found is not None
     return Column(name=found[1], unit=found[2] or "", format=found[3] or "")
@@ -97,19 +97,19 @@ def _round(cell: Cell, spec: str) -> Cell:
     return cell
 
 
-def _command() -> str:
+def _read_command() -> str:
     words = [word for word in sys.orig_argv[1:] if word != WRITE]
     if Path(words[0]).is_absolute():
         words[0] = os.path.relpath(words[0], ROOT)
     return ("PYTHONPATH=. " if "PYTHONPATH" in os.environ else "") + "python " + shlex.join(words)
 
 
-def _git(*words: str) -> str:
+def _run_git(*words: str) -> str:
     line = ["git", *words]
     return subprocess.run(line, cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
 
 
-def _machine() -> str:
+def _describe_machine() -> str:
     processors = Path("/proc/cpuinfo")
     told = re.search(r"model name\s*: (.*)", processors.read_text()) if processors.exists() else None
     model = told[1] if told else platform.machine()

@@ -1,4 +1,4 @@
-"""Writes docs/results from the JSON of its data folder: ``make results``."""
+"""Write docs/results from the JSON of its data folder: ``make results``."""
 
 import json
 from collections.abc import Iterator
@@ -105,10 +105,10 @@ def write_page(name: str, page: Page) -> None:
 def pages() -> dict[str, str]:
     """Render every page, by the name of its file."""
     names = sorted(path.stem for path in DATA.glob("*.json"))
-    return {f"{name}.md": "\n".join(_rendered(read_page(name))) + "\n" for name in names}
+    return {f"{name}.md": "\n".join(_render(read_page(name))) + "\n" for name in names}
 
 
-def _rendered(page: Page) -> Iterator[str]:
+def _render(page: Page) -> Iterator[str]:
     yield from (f"# {page.title}", "", NOTE, "", page.introduction)
     if page.terms:
         yield from ("", *(f"- *{term}*: {meaning}" for term, meaning in page.terms.items()))
