@@ -64,14 +64,14 @@ def finish_figure(
     if not wanted or figure not in [each.id for each in old.figures]:
         table = Table(*(f"{head.name}, {head.unit}".removesuffix(", ") for head in heads), title=figure)
         for row in kept:
-            table.add_row(*(show_cell(*each) for each in zip(row, formats, strict=True)))
+            table.add_row(*(show_cell(cell, head.format) for cell, head in zip(row, heads, strict=True)))
         Console(highlight=False, width=150).print(table)
         return
     update = {
         "columns": heads,
         "rows": kept,
         "command": command or _read_command(),
-        "commit": _run_git("describe", "--always", "--dirty", "--exclude=*"),
+        "commit": _describe_commit(),
         "date": datetime.now(UTC).date().isoformat(),
         "machine": _describe_machine(),
     }
@@ -104,9 +104,16 @@ def _read_command() -> str:
     return ("PYTHONPATH=. " if "PYTHONPATH" in os.environ else "") + "python " + shlex.join(words)
 
 
-def _run_git(*words: str) -> str:
-    line = ["git", *words]
-    return subprocess.run(line, cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
+def _describe_commit() -> str:
+    """Name the commit; changes of the results themselves do not make it dirty."""
+    commit, changes = (
+        subprocess.run(["git", *words], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()  # noqa: S607
+        for words in (
+            ("rev-parse", "--short=8", "HEAD"),
+            ("status", "--porcelain", "--untracked-files=no", "--", ".", ":!docs/results"),
+        )
+    )
+    return commit + ("-dirty" if changes else "")
 
 
 def _describe_machine() -> str:

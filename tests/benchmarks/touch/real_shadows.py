@@ -78,7 +78,7 @@ def main() -> None:
 def speed(taxim: Path) -> None:
     """Milliseconds of the processor, 640 x 480: colours of the fast level, and what shadows take besides."""
     cv2.setNumThreads(1)
-    rows = []
+    table = []
     for name in TOPS:
         press = published_press(taxim, name)
         background: ByteArray = np.clip(press.background, 0.0, 255.0).astype(np.uint8)
@@ -92,9 +92,9 @@ def speed(taxim: Path) -> None:
         taken = shadows()[0]
         ways = (partial(optics.render, deep), shadows, partial(darkened, plain, taken))
         colour, thrown, laid = (_milliseconds(way) for way in ways)
-        rows.append((name, colour, thrown, laid, colour + thrown + laid))
+        table.append((name, colour, thrown, laid, colour + thrown + laid))
     heads = "press; colours [CPU ms] .1f; shadows thrown .1f; shadows laid over .1f; together .1f"
-    finish_figure("touch_pictures", "time of shadows", heads, rows)
+    finish_figure("touch_pictures", "time of shadows", heads, table)
 
 
 def _milliseconds(way: Callable[[], object]) -> float:
