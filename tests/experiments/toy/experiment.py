@@ -1,7 +1,7 @@
 """A toy experiment: how high did the gel stand when it touched? By the arm's last pose alone."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
@@ -98,9 +98,8 @@ def lines(result: Mapping[str, Any]) -> list[str]:
 
 def sources(scored: Scored) -> Quantities:
     """Where the gel was."""
-    run = scored.run
-    gels: Sequence[FloatArray] = scored.answering.poses
-    return {"contact_gel_from_object": inverse(np.array(gels)) @ run.scene.base_from_object(run.mesh)}
+    run, gels = scored.run, np.array(scored.answering.poses)
+    return {"contact_gel_from_object": inverse(gels) @ run.scene.base_from_object(run.mesh)}
 
 
 EXPERIMENT = Experiment(
