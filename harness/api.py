@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from harness.tasks.audio import RenderedAudio, render_audio
+    from harness.tasks.bench import StationCheck, TakenPicture, check_station, open_station, take_picture
     from harness.tasks.depth import PressDepth, depth
     from harness.tasks.modes import modes
     from harness.tasks.objects import (
@@ -31,6 +32,8 @@ _HOMES = {
     "PressDepth": "harness.tasks.depth",
     "RenderedAudio": "harness.tasks.audio",
     "RenderedVision": "harness.tasks.vision",
+    "StationCheck": "harness.tasks.bench",
+    "TakenPicture": "harness.tasks.bench",
     "TaximResult": "calibration.taxim.result",
     "TouchBuild": "harness.tasks.objects",
     "VerifiedObject": "harness.tasks.objects",
@@ -38,13 +41,16 @@ _HOMES = {
     "answer": "harness.tasks.runs",
     "build_objectfile": "harness.tasks.objects",
     "calibrate_taxim": "calibration.taxim.result",
+    "check_station": "harness.tasks.bench",
     "compare_vision": "harness.tasks.vision",
     "depth": "harness.tasks.depth",
     "load_object": "harness.tasks.objects",
     "modes": "harness.tasks.modes",
+    "open_station": "harness.tasks.bench",
     "render_audio": "harness.tasks.audio",
     "render_vision": "harness.tasks.vision",
     "tactile_image": "harness.tasks.touch",
+    "take_picture": "harness.tasks.bench",
     "verify_object": "harness.tasks.objects",
 }
 """Name to the module that defines it."""
@@ -55,6 +61,8 @@ __all__ = [
     "PressDepth",
     "RenderedAudio",
     "RenderedVision",
+    "StationCheck",
+    "TakenPicture",
     "TaximResult",  # noqa: F822 - above the core, so that no import names it
     "TouchBuild",
     "VerifiedObject",
@@ -62,13 +70,16 @@ __all__ = [
     "answer",
     "build_objectfile",
     "calibrate_taxim",  # noqa: F822 - above the core, so that no import names it
+    "check_station",
     "compare_vision",
     "depth",
     "load_object",
     "modes",
+    "open_station",
     "render_audio",
     "render_vision",
     "tactile_image",
+    "take_picture",
     "verify_object",
 ]
 

@@ -5,10 +5,10 @@ import os
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, TypeVar, cast
+from typing import Protocol, TypeVar, cast
 
 from harness.basics.errors import BenchFault, SafetyStop, TouchstoneError, WrongUse
 from harness.basics.mesh import Mesh
@@ -248,16 +248,6 @@ class Checked:
     failures: Mapping[str, TouchstoneError]  #: by name, why the others do not.
     safety: str | None  #: the arm's; None where the arm did not open.
     levels: Mapping[str, Mapping[str, float]]  #: what instruments read at rest, by name.
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the values for ``--json``."""
-        return {
-            "safety": self.safety,
-            "instruments": [asdict(health) for health in self.instruments],
-            "failures": {name: str(error) for name, error in self.failures.items()},
-            "hammer_levels": None,
-            **{f"{name}_levels": dict(levels) for name, levels in self.levels.items() if levels},
-        }
 
 
 def check_bench(bench: Bench) -> Checked:

@@ -24,6 +24,7 @@ from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
 from harness.recording.step_file import Step
 from harness.report.run_page import instruments
+from harness.tasks.bench import StationCheck
 from mocks.in_process.bench import in_process_bench
 from tests.experiments.toy.experiment import EXPERIMENT
 from tests.experiments.toy.test_toy import ROW as TOY
@@ -115,7 +116,7 @@ def test_its_health_and_the_scene_camera_s_are_in_the_report(done: Done) -> None
 def test_check_states_how_it_does_and_what_it_reads(done: Done) -> None:
     assert [health.name for health in done.checked.instruments] == ["arm", "gel", "camera", "thermometer"]
     assert done.checked.instruments[-1].detail == f"{KELVIN:.1f} K"
-    tree = done.checked.as_json()
+    tree = StationCheck.of("thermometer", done.checked).as_json()
     assert tree["thermometer_levels"] == {"temperature_k": KELVIN}
     assert tree["hammer_levels"] is None
 
