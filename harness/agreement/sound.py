@@ -32,7 +32,6 @@ from harness.agreement.subject import PressedContact, Subject
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import TouchstoneError, WrongUse
 from harness.basics.geometry import inverse
-from harness.sim.modal.modal import from_arrays
 from harness.sim.modal.modes import Modes
 from harness.strikes.peaks import Peak, analyse
 
@@ -139,10 +138,11 @@ def compare_sound(
     if not len(peaks):
         return SenseResiduals("sound", source, (), "no resonance stood out of the noise in two strikes")
     try:
-        simulated = subject.simulated("audio", source, ("object.modes",), {})
-        modes, error = from_arrays(simulated.values["object_modes"]), gain_error(subject, source)
+        modes = subject.simulated("audio", source, ("object.modes",), {}).sound.modes
+        error = gain_error(subject, source)
     except TouchstoneError as refusal:
         return SenseResiduals("sound", source, (), str(refusal))
+    assert modes is not None  # they were wanted
     resonances = resonance_residual(struck[-1].step, peaks, np.asarray(modes.frequencies), noise)
     places = struck_modes(subject, struck, modes, resonances.numbers["factor"], error)
     still = microphone_residual(struck[-1].step, evidence.peaks, places, shares, phases)

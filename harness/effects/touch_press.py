@@ -15,7 +15,7 @@ import numpy as np
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray
 from harness.basics.errors import WrongUse
 from harness.bench.scene import SceneFile
-from harness.effects import touch as effects_of_touch
+from harness.effects import touch
 from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import Effect, Facts, build_catalogue, knobs_of, quantity_name
@@ -29,13 +29,13 @@ from harness.sim.gel.height_file import Heights
 from harness.sim.optics.pressed_gel import Gel
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
-_COLOUR = Effect("touch.colour", effects_of_touch.select_colour)
+_COLOUR = Effect("touch.colour", touch.select_colour)
 
 PRESS_EFFECTS = build_catalogue(
     *(_COLOUR if effect.provides == _COLOUR.provides else effect for effect in EFFECTS),
-    Effect("touch.drawn", effects_of_touch.render_images, knobs=(effects_of_touch.OPTICS,)),
-    Effect("touch.saturated", effects_of_touch.select_saturated),
-    Effect("touch.extrapolated", effects_of_touch.select_extrapolated),
+    Effect("touch.drawn", touch.render_images, knobs=(touch.OPTICS,)),
+    Effect("touch.saturated", touch.select_saturated),
+    Effect("touch.extrapolated", touch.select_extrapolated),
 )
 """Every effect of a press."""
 
@@ -44,7 +44,7 @@ _KNOBS = knobs_of(effect for effect in PRESS_EFFECTS if effect.provides.startswi
 
 @dataclass(frozen=True, eq=False)
 class Press:
-    """A press, drawn."""
+    """One press of a gel and its picture."""
 
     gel: Gel  #: that was pressed.
     plan: Plan  #: what ran, what did not, and why.
@@ -219,11 +219,11 @@ def press_gel(
     if "object.file" in made.sources and scene.object.objectfile is not None:
         whole["object_file"] = ObjectFile.open(Path(scene.object.objectfile))
     done = evaluate(made, whole)
-    touch = done.touch
-    for depths in (touch.height_map, touch.gel):
+    result = done.touch
+    for depths in (result.height_map, result.gel):
         if depths is not None:
             require_within_gel(depths, gel.sensor)
-    seen: Heights = "gel" if touch.height_map is None else of
+    seen: Heights = "gel" if result.height_map is None else of
     heights = done.values["touch_gel" if seen == "gel" else "touch_height_map"][0]
     return Press(gel, made, done, contact_of(heights, gel.calibration, seen), seen)
 

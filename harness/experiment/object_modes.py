@@ -17,7 +17,6 @@ from harness.effects.quantities import Quantities
 from harness.effects.scene_object import known_file
 from harness.objectfile.file import ObjectFile
 from harness.recording.run_folder import RunFiles
-from harness.sim.modal.modal import from_arrays
 from harness.sim.modal.modes import Modes
 
 ReadFile = Callable[[], ObjectFile | None]
@@ -56,4 +55,6 @@ def object_modes(
         of = (objectfile or partial(known_file, scene, mesh))()
         if of is not None:
             sources["object_file"] = of
-    return from_arrays(evaluate(chosen, sources, Store(default_folder())).values["object_modes"])
+    modes = evaluate(chosen, sources, Store(default_folder())).sound.modes
+    assert modes is not None  # they were wanted
+    return modes
