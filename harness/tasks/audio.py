@@ -11,6 +11,7 @@ import numpy as np
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.result import HIDDEN, JSON_ONLY, Result
+from harness.bench.scene_objectfile import objectfile_folder
 from harness.objectfile.audio.audio import ObjectAudio, open_audio
 from harness.objectfile.audio.blow import HammerBlow, hammer, hammered
 from harness.objectfile.audio.sound_wav import BITS, wav_rate, write_wav
@@ -140,7 +141,7 @@ def render_audio(
     if out is not None:
         wav_rate(rate)
     begun = time.perf_counter()
-    objectfile = ObjectFile.open(Path(folder))
+    objectfile = ObjectFile.open(objectfile_folder(str(folder), Path.cwd()))
     if level not in ("network", "table"):
         raise WrongUse(f"no level {level!r} of a sound; --level takes network, or table for the exact gains")
     audio = open_audio(objectfile, level)

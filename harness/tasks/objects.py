@@ -18,6 +18,7 @@ from harness.basics.materials import Material
 from harness.basics.materials import material as named
 from harness.basics.result import HIDDEN, JSON_ONLY, JsonValue, Result
 from harness.basics.store import Store, default_folder
+from harness.bench.scene_objectfile import objectfile_folder
 from harness.bench.sensor import DEFAULT_MAKE, described_sensor
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.published.entries import PublishedObject, open_either
@@ -32,13 +33,13 @@ Report = Callable[[str, float], None]
 
 
 def load_object(folder: str | Path) -> ObjectFile | PublishedObject:
-    """Open the ObjectFile of a folder; networks are loaded on first use.
+    """Open an ObjectFile by its folder or its name, e.g. ``mug``; networks are loaded on first use.
 
     Raises:
         WrongUse: there is no ObjectFile.
         DataRefused: its ``object.json`` is damaged or of another version.
     """
-    return open_either(Path(folder))
+    return open_either(objectfile_folder(str(folder), Path.cwd()))
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from harness.basics.npz_file import write_array
 from harness.basics.result import HIDDEN, JSON_ONLY, Result
 from harness.bench.scene import load_scene
 from harness.bench.scene_camera import Lamp, scene_frame, scene_lamps, scene_pinhole
+from harness.bench.scene_objectfile import objectfile_folder
 from harness.bench.station_file import load_station, station_path
 from harness.effects.scene_object import known_object
 from harness.objectfile.file import ObjectFile
@@ -178,7 +179,7 @@ def render_vision(
             "size, or smaller ones"
         )
     begun = time.perf_counter()
-    objectfile = ObjectFile.open(Path(folder))
+    objectfile = ObjectFile.open(objectfile_folder(str(folder), Path.cwd()))
     vision = open_vision(objectfile, threads)
     views = _views(vision, size, (camera, look_at, up), field_of_view, light, turntable or 1)
     eye, lamp = views[0]
@@ -405,7 +406,7 @@ def compare_vision(
     pose = camera, look_at, up
     _require_one_camera(station, scene, live, camera, (*pose, field_of_view))
     begun = time.perf_counter()
-    objectfile = ObjectFile.open(Path(folder))
+    objectfile = ObjectFile.open(objectfile_folder(str(folder), Path.cwd()))
     vision = open_vision(objectfile, threads)
     seconds = {"load": time.perf_counter() - begun}
     begun = time.perf_counter()
