@@ -281,6 +281,7 @@ def pressed(wanted: PressRequest, as_json: bool) -> Path | None:
     from harness.experiment.lookup import require_of
     from harness.experiment.perform import describe_bench, perform_on_bench, steps_planned
     from harness.recording.recording import Recording
+    from harness.recording.run_folder import RunFiles
 
     if wanted.resume is None:
         recording = _begun(wanted)
@@ -298,7 +299,7 @@ def pressed(wanted: PressRequest, as_json: bool) -> Path | None:
             resumable(how),
             step_progress(recording.committed, total, presses.step) as told,
         ):
-            done = perform_on_bench(presses, recording, told, say=told.say)
+            done = perform_on_bench(presses, RunFiles(recording), told, say=told.say)
         if not done.complete:
             stopped(f"{presses.step} {recording.committed}", recording.folder, how, as_json)
             return None

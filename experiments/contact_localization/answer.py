@@ -1,19 +1,20 @@
 """From a run's readings to its answer, at any accuracy; neither the bench nor the truth is needed."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TypeVar
 
-from numba.core.event import install_recorder
+import numpy as np
 
-from experiments.contact_localization.accuracy.dials import SIMULATED, accuracy_at, needs_images, needs_sound
+from experiments.contact_localization.accuracy.dials import SIMULATED, accuracy_at, needs_sound
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import (
     BLOCK,
     METHOD,
+    PARTICLES,
     ROUNDS,
     SAMPLES,
     SENSES,
@@ -22,77 +23,27 @@ from experiments.contact_localization.posterior.dials import (
 )
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.noise import noise_at
+from experiments.contact_localization.posterior.policy import Readings, estimate_contacts, read
 from experiments.contact_localization.section import Localization
-from experiments.contact_localization.touch.touch import Contact, contact_of
+from experiments.contact_localization.touch.touch import contact_of
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, MeshRefused, WrongUse
+from harness.basics.geometry import frame_facing, transform
 from harness.basics.symmetry import SymmetryGroup, find_symmetries
-from harness.bench.bench_errors import BenchErrors
+from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy, Level, Setting
 from harness.effects.touch import SHAPES as TOUCH
 from harness.experiment.solving import Solved
-from harness.picture.square_pixels import aspect_stated
-from harness.recording.observation import Observation, in_time, observe_step
+from harness.recording.observation import Observation, in_time
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
-from harness.sim.optics.inverse import heights_or_refusal
-
-T = TypeVar("T")
-
+from harness.sim.modal.modes import Modes
 
 PROGRAM = "contact-localization"
 
 
 ESTIMATOR = "experiments.contact_localization.posterior.estimate"
 """The module whose sources, with all they import, decide whether a curve still holds."""
-
-
-_LOOKED_BY = (SPACING, ROUNDS, SAMPLES, BLOCK)
-"""How finely readings are looked at; which senses are asked, and how they are simulated, is another thing."""
-
-
-@dataclass(frozen=True, eq=False)
-class Readings:
-    """A run's readings, brought as far as settings share: the height maps of its images."""
-
-    observations: tuple[Observation, ...]  #: of the contacts.
-    heights: tuple[FloatArray, ...]  #: a height map for each; none where no setting looks at images.
-    model: Model  #: the object and the sensor.
-    prior: Prior  #: of its orientation.
-    seed: int  #: of the draws.
-    shared: tuple[float, float]  #: s of CPU time and on the clock that the height maps took.
-    refused_pictures: Mapping[int, str] = field(default_factory=dict)
-    """why a contact's picture is not used, by its number from 0; its height map is zero."""
-
-    @property
-    def pictured(self) -> bool:
-        """Whether not every picture is refused."""
-        return not self.refused_pictures or len(self.refused_pictures) < len(self.observations)
-
-    @property
-    def struck(self) -> bool:
-        """Whether any contact was."""
-        return any(observation.strike is not None for observation in self.observations)
-
-    @property
-    def heard(self) -> bool:
-        """Whether any contact was struck, and the object has modes to compare its sound with."""
-        return self.struck and not self.model.sound_refusal
-
-    def under(self, model: Model) -> "Readings":
-        """The same readings, to be compared with another model of the object."""
-        return replace(self, model=model)
-
-    def first(self, count: int) -> "Readings":
-        """Those of the first contacts alone."""
-        share = count / len(self.observations)
-        return replace(
-            self,
-            observations=self.observations[:count],
-            heights=self.heights[:count],
-            refused_pictures={k: why for k, why in self.refused_pictures.items() if k < count},
-            shared=(share * self.shared[0], share * self.shared[1]),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,33 +70,6 @@ class Models:
         return dict(self._made)
 
 
-def read(
-    observations: Sequence[Observation], model: Model, prior: Prior, seed: int, images: bool = True
-) -> Readings:
-    """Do, and time, what settings share.
-
-    Args:
-        observations: of the contacts.
-        model: the object and the sensor.
-        prior: of the object's orientation.
-        seed: of the draws.
-        images: whether any setting looks at the images.
-    """
-    cpu, wall = time.process_time(), time.perf_counter()
-    maps = [heights_or_refusal(each.images, model.calibration) for each in observations] if images else []
-    taken = time.process_time() - cpu, time.perf_counter() - wall
-    heights = tuple(heights for heights, _ in maps)
-    refused_pictures = {contact: refusal for contact, (_, refusal) in enumerate(maps) if refusal}
-    return Readings(tuple(observations), heights, model, prior, seed, taken, refused_pictures)
-
-
-def loaded(timed: Callable[[], T]) -> T:
-    """What times itself, once more where a kernel was compiled or loaded meanwhile: nothing counts that."""
-    with install_recorder("numba:compiler_lock") as loads:
-        found = timed()
-    return timed() if loads.buffer else found
-
-
 def prepare(model: Model, setting: Setting) -> None:
     """Make what depends on the object alone, before any reading is needed: its samples and gains."""
     spacing = accuracy_at(setting).of(SPACING)
@@ -154,98 +78,73 @@ def prepare(model: Model, setting: Setting) -> None:
         model.gains(spacing)
 
 
+_KERNELS: set[tuple[Level, ...]] = set()
+"""Methods, senses and object models whose kernels this process has loaded."""
+
+
+def load_kernels(model: Model, setting: Setting) -> None:
+    """Compile or load the kernels of an estimate, so that the seconds of no answer count it.
+
+    A synthetic run of two presses, and of two strikes if the object has modes, is estimated once.
+
+    Args:
+        model: the object and the sensor.
+        setting: method, senses and spacing of the estimates.
+    """
+    small = {ROUNDS.name: 1, SAMPLES.name: SAMPLES.levels[0], PARTICLES.name: PARTICLES.levels[0]}
+    accuracy = accuracy_at({**setting, **small})
+    kind = accuracy.of(METHOD), accuracy.of(SENSES), model.seen is None, model.modes is None
+    if kind in _KERNELS or (accuracy.of(SENSES) != "touch" and model.modes is None):
+        return
+    _KERNELS.add(kind)
+    sensor, noise, surface = model.sensor, noise_at(model.errors), model.surface(accuracy.of(SPACING))
+    top = int(np.argmax(surface.points[:, 2]))
+    chosen = [top, int(surface.neighbours[top, -1])]
+    rows, columns = np.indices((sensor.rows, sensor.columns))
+    far = np.hypot(rows - 0.5 * sensor.rows, columns - 0.5 * sensor.columns) / sensor.rows
+    bump = 1.0e-3 * np.maximum(0.0, 1.0 - (4.0 * far) ** 2)
+    poses = [transform(frame_facing(-surface.normals[k], 0.0), surface.points[k]) for k in chosen]
+    contacts = [contact_of(pose, bump, sensor.pitch, accuracy.of(BLOCK), noise.touch) for pose in poses]
+    strikes = () if model.modes is None else synthetic_strikes(model.modes, surface.points[chosen])
+    for judged in (False, True):
+        with suppress(FitRefused):
+            locate(contacts, model, Prior(np.eye(3)), accuracy, noise, strikes=strikes, judged=judged)
+
+
+def synthetic_strikes(modes: Modes, points: FloatArray) -> tuple[Strike, ...]:
+    """Let the first modes of an object ring after a blow at each of ``(k, 3)`` points in m."""
+    rate, onset, count = 50_000.0, 1000, 16
+    times = np.arange(round(0.4 * rate)) / rate
+    force = np.zeros(len(times))
+    force[onset : onset + 10] = 20.0 * np.sin(np.pi * np.arange(10) / 10)
+    ringing = np.exp(-25.0 * times) * np.sin(2.0 * np.pi * modes.frequencies[:count, None] * times)
+    gains = modes.gains(points, np.tile([0.0, 0.0, -1.0], (len(points), 1)))[:, :count]
+    noise = np.random.default_rng(0).normal(0.0, 1.0e-6, len(times))
+    pressures = [noise + np.roll(gain @ ringing, onset) for gain in gains]
+    return tuple(
+        Strike(rate, force, pressure, onset, 0.0, overload=False, double_hit=False, silent=False)
+        for pressure in pressures
+    )
+
+
 def solve(readings: Readings, setting: Setting) -> Solved:
-    """Answer at one setting, timed; call ``prepare`` before."""
+    """Answer at one setting, timed; call ``prepare`` and ``load_kernels`` before."""
     accuracy = accuracy_at(setting)
     cpu, wall = time.process_time(), time.perf_counter()
     estimate, refusal = None, None
     try:
-        estimate = located(readings, accuracy)[-1]
+        estimate = estimate_contacts(readings, accuracy)[-1]
     except FitRefused as error:
         refusal = str(error)
     taken = time.process_time() - cpu, time.perf_counter() - wall
     return Solved(estimate, None if estimate is None else estimate.credible90, *taken, refusal)
 
 
-def located(
-    readings: Readings, accuracy: Accuracy, first: int | None = None, judged: bool = True
-) -> tuple[Estimate, ...]:
-    """The estimates after each contact from the ``first`` on; after the last alone where None.
-
-    Where the last one's residuals are larger than the bench's stated errors allow, it is estimated again
-    under errors so much larger, and says so. What fits no place at other levels than the default's is
-    estimated again at these: a refusal may not hang on how finely one looked.
-
-    Args:
-        readings: of the run.
-        accuracy: of the estimates.
-        first: contacts of the first estimate.
-        judged: whether readings that fit no place are refused, or estimated all the same.
-
-    Raises:
-        FitRefused: no place on this object explains the readings, no image shows a contact, or no picture
-            of them may be used.
-    """
-    errors, began = readings.model.errors, time.perf_counter()
-    try:
-        found = _located_at(errors, readings, accuracy, first, judged)
-    except FitRefused:
-        usual = accuracy.with_({knob.name: knob.default for knob in _LOOKED_BY})
-        if usual.levels == accuracy.levels:
-            raise
-        lost = time.perf_counter() - began
-        found = located(readings, usual, first, judged)
-        last = found[-1]
-        # What the refused attempt took counts with the last one's judging.
-        seconds = {**last.seconds, "judge": last.seconds.get("judge", 0.0) + lost}
-        doubt = "at the levels asked for no place explained the readings; at the default levels this one does"
-        return (*found[:-1], replace(last, seconds=seconds, doubts=(*last.doubts, doubt)))
-    factor = found[-1].times_stated if judged and accuracy.of(METHOD) == "grid" else 1.0
-    if factor == 1.0:
-        return found
-    less_sure = replace(readings, prior=readings.prior.times(factor))
-    wider = _located_at(errors.times(factor), less_sure, accuracy)[-1]
-    # The seconds are those of both answers but for the images.
-    before = {stage: took for stage, took in found[-1].seconds.items() if stage != "images"}
-    seconds = {stage: took + before.get(stage, 0.0) for stage, took in wider.seconds.items()}
-    doubt = (
-        f"the readings are {factor:.1f} times further off than the station's [errors] allow, by the fit's "
-        "own residuals: the region is that of errors so large; check the bench, or state them"
-    )
-    return (*found[:-1], replace(wider, seconds=seconds, doubts=(*wider.doubts, doubt)))
-
-
-def _located_at(
-    errors: BenchErrors,
-    readings: Readings,
-    accuracy: Accuracy,
-    first: int | None = None,
-    judged: bool = True,
-) -> tuple[Estimate, ...]:
-    noise, images = noise_at(errors), needs_images(accuracy)
-    if images and not readings.pictured:
-        raise FitRefused(f"no contact's picture may be used; of contact 1: {readings.refused_pictures[0]}")
-    pitch, block = readings.model.sensor.pitch, accuracy.of(BLOCK)
-    contacts = [Contact(observation.base_from_gel) for observation in readings.observations]
-    for index, heights in enumerate(readings.heights if images else ()):
-        if index not in readings.refused_pictures:
-            pose = contacts[index].base_from_gel
-            contacts[index] = contact_of(pose, heights, pitch, block, noise.touch)
-    strikes = [observation.strike for observation in readings.observations] if readings.heard else []
-    seconds = readings.shared[1] if images else 0.0
-    model, prior, seed = readings.model, readings.prior, readings.seed
-    return locate(contacts, model, prior, accuracy, noise, seed, first, seconds, strikes, judged)
-
-
 @dataclass(frozen=True, eq=False)
 class Answer:
     """What the recording says of its last contact."""
 
-    observations: tuple[Observation, ...]  #: the contacts as recorded.
-    heights: tuple[FloatArray, ...]
-    """``(rows, columns)`` metres of indentation of each contact, from its images."""
-    model: Model  #: the object and the sensor.
-    prior: Prior  #: what was believed of the object's orientation.
+    readings: Readings  #: the readings that it is made from.
     last: Estimate  #: the answer.
     seconds: float
     """of the answer, from images to region; the surface's samples are made once before, and kernels are
@@ -253,8 +152,6 @@ class Answer:
     sense: Senses = "touch"  #: what ``last`` is by.
     others: Mapping[Senses, Estimate | FitRefused] = field(default_factory=dict)
     """the answer by each other sense, or why that sense refused the object."""
-    refused_pictures: Mapping[int, str] = field(default_factory=dict)
-    """why a contact's picture is left out, by its number from 0; its height map is zero."""
 
     @property
     def by_sense(self) -> dict[Senses, Estimate | FitRefused]:
@@ -276,14 +173,15 @@ class ContactAnswering:
 
     def __init__(self, run: RunFiles, accuracy: Accuracy) -> None:
         self.model, self.prior = model_of_run(run, accuracy), prior_of(run)
+        _ = run.gel_reader
         self._accuracy, self._run = accuracy, run
         self._seen: list[Observation] = []
-        self._heights: list[FloatArray] = []
-        self._refused_pictures: dict[int, str] = {}
-        self._taken = (0.0, 0.0)
+        self._readings: Readings | None = None
         if self.model.sound_refusal and accuracy.of(SENSES) == "audio":
             raise MeshRefused(f"an estimate by sound alone was asked for, and {self._sound_refusal}")
         prepare(self.model, accuracy)
+        for sense in SENSES.levels:
+            load_kernels(self.model, {**accuracy, SENSES.name: sense})
         _ = self.symmetry
 
     @cached_property
@@ -300,21 +198,16 @@ class ContactAnswering:
         """
         if not self._seen:
             raise WrongUse("no contact was read; a run needs at least one")
-        seed = self._run.recording.header.seed
-        seen, heights, refused = in_time(self._seen), tuple(self._heights), dict(self._refused_pictures)
-        return Readings(seen, heights, self.model, self.prior, seed, self._taken, refused)
+        if self._readings is None:
+            seen, seed = in_time(self._seen), self._run.recording.header.seed
+            self._readings = read(seen, self._run.gel_reader, self.model, self.prior, seed)
+        return self._readings
 
     def read(self, record: StepRecord) -> None:
-        """Take in a contact; its images are turned into heights here, and nowhere else."""
-        station = self._run.station
-        aspect = aspect_stated(self._run.calibration.header.made_from)
-        seen = observe_step(record, station.flange_from_gel, self._run.acquisition, aspect)
-        one = loaded(lambda: read([seen], self.model, self.prior, seed=0))
-        if one.refused_pictures:
-            self._refused_pictures[len(self._seen)] = one.refused_pictures[0]
-        self._seen.append(seen)
-        self._heights += one.heights
-        self._taken = (self._taken[0] + one.shared[0], self._taken[1] + one.shared[1])
+        """Take in a contact; its picture is inverted while the arm rests."""
+        self._seen.append(self._run.observe(record))
+        self._run.gel_reader.read(self._seen[-1].images)
+        self._readings = None
 
     def answer(self) -> Answer:
         """By the sense that the accuracy names, and by each other one that was recorded.
@@ -330,12 +223,10 @@ class ContactAnswering:
         readings = self.readings
         senses: tuple[Senses, ...] = SENSES.levels if readings.struck else ("touch",)
         sense = self._sense_of(readings)
-        last = loaded(lambda: self._located(sense, readings)[-1])
+        last = self._located(sense, readings)[-1]
         others = {other: self._tried(other, readings) for other in senses if other != sense}
         seconds = sum(last.seconds.values())
-        seen, heights = readings.observations, readings.heights
-        refused_pictures = readings.refused_pictures
-        return Answer(seen, heights, self.model, self.prior, last, seconds, sense, others, refused_pictures)
+        return Answer(readings, last, seconds, sense, others)
 
     def so_far(self) -> Estimate:
         """The estimate by the contacts read so far, which is not judged: more are to come.
@@ -386,14 +277,14 @@ class ContactAnswering:
         if self.model.sound_refusal and sense != "touch":
             return FitRefused(self._sound_refusal)
         try:
-            return loaded(lambda: self._located(sense, readings)[-1])
+            return self._located(sense, readings)[-1]
         except FitRefused as refusal:
             return refusal
 
     def _located(
         self, sense: Senses, readings: Readings, first: int | None = None, judged: bool = True
     ) -> tuple[Estimate, ...]:
-        return located(readings, self._accuracy.with_({SENSES.name: sense}), first, judged)
+        return estimate_contacts(readings, self._accuracy.with_({SENSES.name: sense}), first, judged)
 
 
 def prior_of(run: RunFiles) -> Prior:
@@ -404,8 +295,4 @@ def prior_of(run: RunFiles) -> Prior:
 
 def observe(run: RunFiles) -> tuple[Observation, ...]:
     """The contacts of a run, from its images, arm poses and strikes."""
-    flange_from_gel, acquisition = run.station.flange_from_gel, run.acquisition
-    aspect = aspect_stated(run.calibration.header.made_from)
-    return in_time(
-        [observe_step(record, flange_from_gel, acquisition, aspect) for record in run.recording.steps()]
-    )
+    return in_time([run.observe(record) for record in run.recording.steps()])

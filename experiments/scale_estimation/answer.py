@@ -12,7 +12,7 @@ from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief, fused
 from experiments.scale_estimation.sound.hearing import Hearing, by_sound
-from experiments.scale_estimation.sound.peaks import Peaks
+from experiments.scale_estimation.sound.peaks import Peaks, load_kernels
 from experiments.scale_estimation.touch.patch import Patch, free_line, patch_of
 from experiments.scale_estimation.touch.touch import Touch, by_touch
 from experiments.scale_estimation.unseen.answer import (
@@ -31,14 +31,11 @@ from harness.basics.materials import MATERIALS
 from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy
 from harness.experiment.object_modes import carried_by
-from harness.picture.object_mask import mask_by_background
 from harness.picture.outline import SeenOutline, read_outline
-from harness.picture.square_pixels import aspect_stated
-from harness.recording.observation import Observation, look_pictures, observe_step, picture_left_out
+from harness.recording.observation import Observation, picture_left_out
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
-from harness.sim.optics.inverse import invert_mean
-from harness.sim.optics.tactile_calibration import TactileCalibration
+from harness.sim.optics.inverse import GelReader
 from harness.skills.exploring.exploration import SKIPPED
 from harness.strikes.peaks import analyse
 from harness.strikes.spectra import Analysis
@@ -109,8 +106,9 @@ class ScaleAnswering:
         self._peaks: tuple[int, Peaks | None] = (0, None)
 
     def load(self) -> None:
-        """Make what depends on the object alone, while the arm has other things to do."""
+        """Make what depends on the object alone and load the kernels, while the arm moves."""
         sensors = self.run.scene.sensors
+        _ = self.run.gel_reader
         if not self.shape_known:
             for sense, asked in (("sound", sensors.sound), ("touch", sensors.touch)):
                 if asked:
@@ -122,6 +120,7 @@ class ScaleAnswering:
             with suppress(WrongUse):  # a station without a camera: said by the answer
                 _ = self.model.view.corners
         if sensors.sound:
+            load_kernels()
             with suppress(MeshRefused):  # said by the answer: sight and touch need no elements
                 self.model.ringing(self.accuracy)
 
@@ -137,8 +136,8 @@ class ScaleAnswering:
             self.left_out.append(str(record.step.parameters["why"]))
             return
         try:
-            pictures = look_pictures(record)
-            outline = None if pictures is None else read_outline(mask_by_background(*pictures))
+            silhouette = self.run.silhouette(record)
+            outline = None if silhouette is None else read_outline(silhouette)
         except DataRefused as refusal:
             self.outline = FitRefused(str(refusal))
             return
@@ -150,13 +149,12 @@ class ScaleAnswering:
 
     def _read_contact(self, record: StepRecord) -> None:
         run, began = self.run, time.perf_counter()
-        aspect = aspect_stated(run.calibration.header.made_from)
-        seen = observe_step(record, run.station.flange_from_gel, run.acquisition, aspect)
+        seen = run.observe(record)
         if seen.strike is not None:
             self.strikes.append(seen.strike)
             began = self._count("audio", began)
         try:
-            patch = patch_of_contact(seen, run.calibration, run.station.gel.sensor.pitch)
+            patch = patch_of_contact(seen, run.gel_reader, run.station.gel.sensor.pitch)
         except PictureRefused as refusal:  # whether the gel met anything is not known either
             self.refused_pictures.append(picture_left_out(record.step.index, refusal))
             return
@@ -289,18 +287,20 @@ class ScaleAnswering:
         return FitRefused(f"no contact's picture may be used; {self.refused_pictures[0]}")
 
 
-def patch_of_contact(seen: Observation, calibration: TactileCalibration, pitch: float) -> Patch | None:
-    """Where a contact met the object; None where the gel touched nothing.
+def patch_of_contact(seen: Observation, reader: GelReader, pitch: float) -> Patch | None:
+    """Return where a contact met the object; None if the gel touched nothing.
 
     Args:
         seen: the contact.
-        calibration: of the gel.
+        reader: reader of the gel's pictures.
         pitch: m of gel that a pixel shows.
 
     Raises:
         PictureRefused: its picture is not what the calibration was made of.
     """
-    return patch_of(invert_mean(seen.images, calibration).height[0], pitch, seen.base_from_gel)
+    reading = reader.read(seen.images)
+    reading.require_accepted()
+    return patch_of(reading.height, pitch, seen.base_from_gel)
 
 
 def peaks_of(strikes: Sequence[Strike]) -> Peaks | None:

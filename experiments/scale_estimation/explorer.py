@@ -37,8 +37,6 @@ from harness.bench.station_file import Station
 from harness.experiment.experiment import ErrorBound, Helpers, Planned
 from harness.experiment.levels import chosen_levels
 from harness.picture.outline import SeenOutline
-from harness.picture.square_pixels import aspect_stated
-from harness.recording.observation import observe_step
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import Step, StepRecord
@@ -203,11 +201,10 @@ class Explorer:
         """What a contact touched, and ``(3, 3)`` the gel's turn in base."""
         run = self._run
         record = StepRecord(step, {reading.channel.name: reading for reading in read}, 0.0)
-        aspect = aspect_stated(run.calibration.header.made_from)
-        seen = observe_step(record, run.station.flange_from_gel, aspect=aspect)
+        seen = run.observe(record)
         patch = None
         with suppress(PictureRefused):  # the answer names it
-            patch = patch_of_contact(seen, run.calibration, run.station.gel.sensor.pitch)
+            patch = patch_of_contact(seen, run.gel_reader, run.station.gel.sensor.pitch)
         return patch, seen.base_from_gel[:3, :3]
 
     def _take_in(self, recording: Recording, index: int) -> None:

@@ -9,15 +9,12 @@ from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.contact_points import contact_points
 from experiments.shape_reconstruction.evidence import GuardedTouch, SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.section import ShapeRun
-from harness.basics.arrays import ByteArray, FloatArray, read_only
+from harness.basics.arrays import BoolArray, FloatArray, read_only
 from harness.basics.errors import PictureRefused
 from harness.basics.geometry import apply, translation
-from harness.picture.object_mask import mask_by_background
-from harness.picture.square_pixels import aspect_stated
-from harness.recording.observation import look_pictures, observe_step, picture_left_out
+from harness.recording.observation import picture_left_out
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
-from harness.sim.optics.inverse import invert_mean
 from harness.skills.exploring.exploration import SPEEDS
 from harness.skills.press import ContactMotion
 
@@ -40,9 +37,9 @@ class ShapeReadings:
 
     def read(self, record: StepRecord) -> None:
         """Take in a step: a look, a press, or one that was not made."""
-        pictures = look_pictures(record)
-        if pictures is not None:
-            self.look = seen_mask(self.run, *pictures)
+        silhouette = self.run.silhouette(record)
+        if silhouette is not None:
+            self.look = seen_mask(self.run, silhouette)
         elif "gel.image" in record.readings:
             try:
                 self.touches.append(guarded_touch(self.run, record))
@@ -85,11 +82,10 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
         RecordingDamaged: the step has no pictures or no poses.
         PictureRefused: its picture is not what the calibration was made of.
     """
-    calibration, settings = run.calibration, run.scene.section(ShapeRun)
-    aspect = aspect_stated(calibration.header.made_from)
-    seen = observe_step(record, run.station.flange_from_gel, aspect=aspect)
-    read = invert_mean(seen.images, calibration)
-    found = contact_points(read.height[0], read.error[0], run.station.gel.sensor.pitch)
+    settings, seen = run.scene.section(ShapeRun), run.observe(record)
+    read = run.gel_reader.read(seen.images)
+    read.require_accepted()
+    found = contact_points(read.height, read.error, run.station.gel.sensor.pitch)
     stand_from_gel = seen.base_from_gel.copy()
     stand_from_gel[:3, 3] -= base_from_stand(run)[:3, 3]
     nothing = np.zeros((0, 3))
@@ -110,20 +106,15 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
     )
 
 
-def seen_mask(run: RunFiles, live: ByteArray, bare: ByteArray) -> SeenMask | None:
-    """The object's silhouette; None where the camera did not see it.
+def seen_mask(run: RunFiles, mask: BoolArray) -> SeenMask | None:
+    """Return the silhouette as evidence; None if the camera did not see the object.
 
     Args:
-        run: whose camera it is.
-        live: ``(rows, columns, 3)`` RGB, with the object.
-        bare: the same without it.
-
-    Raises:
-        DataRefused: the two pictures are of two sizes.
+        run: folder of the run.
+        mask: ``(rows, columns)`` the object's pixels.
     """
     camera, settings = run.station.camera, run.scene.section(ShapeRun)
     assert camera is not None  # there are its pictures
-    mask = mask_by_background(live, bare)
     if mask.sum() < limits.MIN_PIXELS:
         return None
     stand_from_camera = camera.base_from_camera.matrix.copy()

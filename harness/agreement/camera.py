@@ -14,16 +14,15 @@ import numpy as np
 from harness.agreement.agreement import Residual, SenseResiduals, SideBySide
 from harness.agreement.place_noise import PlaceNoise
 from harness.agreement.subject import Subject
-from harness.basics.arrays import ByteArray, FloatArray
+from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import DataRefused
 from harness.basics.geometry import apply, rotation_from_vector
 from harness.basics.mesh import Mesh
 from harness.basics.mesh_hull import hull_of
 from harness.bench.instruments.cameras import CameraSection
 from harness.picture.camera_errors import CameraErrors
-from harness.picture.object_mask import mask_by_background, overlap
+from harness.picture.object_mask import overlap
 from harness.picture.outline import SeenOutline, corners_of, directions, read_outline
-from harness.recording.observation import look_pictures
 
 _UNKNOWNS = 14
 """The object's place (3), rotation (3) and size, the camera's place (3), rotation (3) and focal length."""
@@ -52,35 +51,33 @@ def compare_camera(
         places: of the object; None for the stated one.
         noise: of the outline; None for the stated one.
     """
-    camera = subject.run.station.camera
-    looks = [
-        (record.step.index, found)
-        for record in subject.run.recording.steps()
-        if (found := look_pictures(record)) is not None
-    ]
-    if camera is None or not looks:
-        return SenseResiduals("camera", "reference", (), "no picture by the scene camera was recorded")
-    places, noise = places or PlaceNoise.at(subject.run.station.errors), noise or OutlineNoise()
-    view = OutlineView(subject.mesh, subject.base_from_object, camera)
-    residuals: list[Residual] = []
-    refusals = []
-    for step, (live, bare) in looks:
+    run, residuals, notes = subject.run, list[Residual](), list[str]()
+    none = SenseResiduals("camera", "reference", (), "no picture by the scene camera was recorded")
+    if run.station.camera is None:
+        return none
+    places, noise = places or PlaceNoise.at(run.station.errors), noise or OutlineNoise()
+    view = OutlineView(subject.mesh, subject.base_from_object, run.station.camera)
+    for record in run.recording.steps():
         try:
-            residuals += _residuals(view, step, live, bare, places, noise)
+            mask = run.silhouette(record)
+            if mask is not None:
+                residuals += _residuals(view, record.step.index, mask, places, noise)
         except DataRefused as refusal:
-            refusals.append(f"step {step + 1}: {refusal}")
-    return SenseResiduals("camera", "reference", tuple(residuals), "; ".join(refusals))
+            notes.append(f"step {record.step.index + 1}: {refusal}")
+    if not residuals and not notes:
+        return none
+    return SenseResiduals("camera", "reference", tuple(residuals), "; ".join(notes))
 
 
 def _residuals(
-    view: "OutlineView", step: int, live: ByteArray, bare: ByteArray, places: PlaceNoise, noise: OutlineNoise
+    view: "OutlineView", step: int, mask: BoolArray, places: PlaceNoise, noise: OutlineNoise
 ) -> list[Residual]:
-    seen = read_outline(mask_by_background(live, bare))
+    seen = read_outline(mask)
     outlines = (seen.extents, view.extents(np.zeros(_UNKNOWNS)))
     filled = []
     for extents in outlines:
         corners = corners_of(SeenOutline(extents, np.zeros(len(extents), np.bool_)))
-        picture = np.zeros(live.shape[:2], np.uint8)
+        picture = np.zeros(mask.shape, np.uint8)
         cv2.fillPoly(picture, [np.rint(corners - 0.5).astype(np.int32)], 1)
         filled.append(picture.astype(np.bool_))
     read, modelled = filled

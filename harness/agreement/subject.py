@@ -21,10 +21,8 @@ from harness.effects.plan import Plan, default_accuracy, plan
 from harness.effects.quantities import Quantities
 from harness.objectfile.entries import Modality
 from harness.objectfile.file import ObjectFile
-from harness.picture.square_pixels import aspect_stated
-from harness.recording.observation import Observation, in_time, observe_step, picture_left_out
+from harness.recording.observation import Observation, in_time, picture_left_out
 from harness.recording.run_folder import RunFiles
-from harness.sim.optics.inverse import heights_or_refusal
 
 SEEN = 0.12e-3
 """m of indentation at the deepest place, below which a picture shows no contact."""
@@ -166,14 +164,12 @@ def contacts_of(run: RunFiles) -> tuple[PressedContact, ...]:
     Raises:
         RecordingDamaged: a step has pictures and no pose of the arm with them.
     """
-    aspect = aspect_stated(run.calibration.header.made_from)
     records = [record for record in run.recording.steps() if "gel.image" in record.readings]
-    seen = in_time(
-        [observe_step(record, run.station.flange_from_gel, run.acquisition, aspect) for record in records]
-    )
+    seen = in_time([run.observe(record) for record in records])
+    gels = [run.gel_reader.read(one.images) for one in seen]
     return tuple(
-        PressedContact(record.step.index, one, *heights_or_refusal(one.images, run.calibration))
-        for record, one in zip(records, seen, strict=True)
+        PressedContact(record.step.index, one, gel.height, gel.refusal)
+        for record, one, gel in zip(records, seen, gels, strict=True)
     )
 
 

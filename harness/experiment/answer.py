@@ -35,13 +35,13 @@ Draw = Callable[[Scored, Comparison, Mapping[str, Health] | None, Path], Path]
 
 
 def score(
-    experiment: Experiment, recording: Recording, accuracy: Accuracy, answering: Answering | None = None
+    experiment: Experiment, run: RunFiles, accuracy: Accuracy, answering: Answering | None = None
 ) -> Scored:
     """Answer, and look at the truth where there is one.
 
     Args:
         experiment: that the run is of.
-        recording: of the run.
+        run: folder of the run.
         accuracy: of the answer.
         answering: that has the readings already; None to take them from the folder.
 
@@ -49,7 +49,7 @@ def score(
         WrongUse: the run holds no step yet.
         FitRefused: nothing explains the readings.
     """
-    run = RunFiles(recording)
+    recording = run.recording
     require_steps(experiment, recording)
     if answering is None:
         answering = experiment.answering(run, accuracy)
@@ -72,7 +72,7 @@ def require_steps(experiment: Experiment, recording: Recording) -> None:
 
 def finish(
     experiment: Experiment,
-    recording: Recording,
+    run: RunFiles,
     accuracy: Accuracy,
     draw: Draw,
     health: Mapping[str, Health] | None = None,
@@ -86,7 +86,7 @@ def finish(
 
     Args:
         experiment: that the run is of.
-        recording: of the run.
+        run: folder of the run.
         accuracy: of the answer and of what is simulated.
         draw: the report of an experiment that has no page of its own.
         health: of the instruments; None for a replay.
@@ -96,8 +96,8 @@ def finish(
         more: further keys of the result.
         since: s on the bench clock, when the last step was on the disk; the result says how long after.
     """
-    folder = folder or recording.folder
-    written = write_answer(experiment, recording, accuracy, folder, answering, publish, more, since)
+    folder = folder or run.recording.folder
+    written = write_answer(experiment, run, accuracy, folder, answering, publish, more, since)
     return add_report(experiment, written, draw, health, folder)
 
 
@@ -111,7 +111,7 @@ class WrittenAnswer:
 
 def write_answer(
     experiment: Experiment,
-    recording: Recording,
+    run: RunFiles,
     accuracy: Accuracy,
     folder: Path,
     answering: Answering | None = None,
@@ -120,7 +120,7 @@ def write_answer(
     since: float | None = None,
 ) -> WrittenAnswer:
     """Answer, write ``result.json``, publish; the arguments are ``finish``'s."""
-    scored = score(experiment, recording, accuracy, answering)
+    scored = score(experiment, run, accuracy, answering)
     result = {**common(experiment, scored), **scored.result, **(more or {})}
     result["warnings"] = [*scored.warnings, *result.get("warnings", ())]
     result["answered_after_s"] = None if since is None else now() - since

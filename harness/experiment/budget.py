@@ -16,7 +16,6 @@ from harness.experiment.experiment import Experiment
 from harness.experiment.front import Front, budgets_of
 from harness.experiment.solving import Shared, Solved, Solver, Target
 from harness.experiment.tables import measurement_of
-from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 
 _NOTHING = 1e-9
@@ -37,9 +36,7 @@ class BudgetedAnswer:
     tried: tuple[str, ...]  #: names of the settings tried, in order.
 
 
-def answer_as_asked(
-    experiment: Experiment, recording: Recording, front: Front, target: Target
-) -> dict[str, Any]:
+def answer_as_asked(experiment: Experiment, files: RunFiles, front: Front, target: Target) -> dict[str, Any]:
     """Answer a recorded run as asked, then once more at the finest levels.
 
     The seconds are from readings in memory to the answer. What depends on the object alone, its
@@ -51,9 +48,9 @@ def answer_as_asked(
     Raises:
         WrongUse: the recording holds no step yet.
     """
-    require_steps(experiment, recording)
+    require_steps(experiment, files.recording)
     budgets = budgets_of(experiment)
-    run = budgets.solver(RunFiles(recording))
+    run = budgets.solver(files)
     front = front.fitting(run.unfit)
     cheapest_first = sorted(_candidates(run, front, target), key=lambda point: point.seconds.value)
     run.load([point.levels for point in cheapest_first])

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.basics.errors import WrongUse
+from harness.basics.errors import DataRefused, WrongUse
 from harness.bench.scene import SceneFile
 from harness.cost.choice import for_budget, for_error, nearest_condition
 from harness.cost.curve import Curve, Point
@@ -18,6 +18,7 @@ from harness.experiment.experiment import Experiment
 from harness.experiment.solving import Budgets, Target
 from harness.experiment.subjects import object_key
 from harness.experiment.tables import measurement_of
+from harness.recording.run_folder import RunFiles
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,10 @@ class Front:
     def trusted(self) -> bool:
         """Whether it was measured on this machine with this code."""
         return not self.reasons
+
+    def at(self, levels: Mapping[str, Level]) -> Point | None:
+        """Return the point that was measured at these levels; None if there is none."""
+        return next((p for p in self.points if p.levels.items() <= levels.items()), None)
 
     def fitting(self, unfit: Callable[[Setting], str | None]) -> "Front":
         """Those settings that a run can be answered at.
@@ -91,6 +96,14 @@ def front_for(experiment: Experiment, scene: SceneFile, steps: int) -> Front:
     reasons = stale(curve, machine(), code(measurement_of(experiment).estimator))
     front = front_of(experiment, curve, {**like, experiment.plural: steps}, reasons, shipped)
     return front.fitting(lambda setting: budgets.unfit(scene, setting))
+
+
+def front_at_hand(experiment: Experiment, run: RunFiles) -> Front | None:
+    """Return the measured settings of runs like this one; None if no curve of this machine has them."""
+    try:
+        return front_for(experiment, run.scene, run.recording.committed)
+    except (WrongUse, DataRefused):
+        return None
 
 
 def front_of(

@@ -35,7 +35,7 @@ def performed(
     gap = cell.conditions["gap"]
     recording = begin(experiment, scene, station, cell.seed, gap, folder).recording
     run = RunFiles(recording)
-    perform_on(experiment, loaded(IN_PROCESS_BENCH)(run.scene, run.station, run.context), recording, Quiet())
+    perform_on(experiment, loaded(IN_PROCESS_BENCH)(run.scene, run.station, run.context), run, Quiet())
     return recording
 
 

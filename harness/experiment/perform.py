@@ -2,12 +2,11 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from harness.basics.clock import clock_offset_ns, now
-from harness.basics.errors import FitRefused, WrongUse
 from harness.bench.device import Health
 from harness.bench.experiments import loaded
 from harness.bench.station import Bench, open_station
@@ -31,9 +30,6 @@ _BENCHES = {
 
 IN_PROCESS_BENCH = "mocks.in_process.bench:in_process_bench"
 """Import string of the latter."""
-
-_REHEARSED_ANSWERS = 2
-"""Steps after which the answer is tried once: what is compiled for it is loaded while the arm rests."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +61,7 @@ def _mocked_as(mock: Mapping[str, Any]) -> str:
 
 def perform_on_bench(
     procedure: Procedure,
-    recording: Recording,
+    run: RunFiles,
     progress: Progress,
     ask: Ask | None = None,
     accuracy: Accuracy | None = None,
@@ -74,12 +70,12 @@ def perform_on_bench(
 ) -> Performed:
     """Open the run's bench and perform what is left.
 
-    What the readings will be compared with is made while the bench opens, and before anything moves: what
-    cannot be answered at all is refused while the arm still stands.
+    What the readings will be compared with is made, and its kernels are loaded, while the bench opens and
+    before anything moves: what cannot be answered at all is refused while the arm still stands.
 
     Args:
         procedure: that the run is of.
-        recording: of the run.
+        run: folder of the run; its readings are shared with whoever else has it.
         progress: is told of each step.
         ask: shows a person what to do, where the station has one strike; None where nobody is there.
         accuracy: of the answer; None where no readings are to be taken in on the way.
@@ -90,7 +86,6 @@ def perform_on_bench(
         MeshRefused: the answer needs the object's sound, or a mocked bench makes it, and its surface cannot
             be filled.
     """
-    run = RunFiles(recording)
     if by_hand(run.scene, run.station):
         somebody(ask)
     ahead = ThreadPoolExecutor(1, "model")
@@ -100,7 +95,7 @@ def perform_on_bench(
     ahead.shutdown(wait=False)  # a bench that does not open says so at once
     with _bench_of(run) as bench:
         made = None if answering is None else answering.result()
-        performed = perform_on(procedure, bench, recording, progress, ask, made, say)
+        performed = perform_on(procedure, bench, run, progress, ask, made, say)
         if performed.complete:
             conclude(performed)
     return performed
@@ -120,7 +115,7 @@ def _bench_of(run: RunFiles) -> Iterator[Bench]:
 def perform_on(
     procedure: Procedure,
     bench: Bench,
-    recording: Recording,
+    run: RunFiles,
     progress: Progress,
     ask: Ask | None = None,
     answering: Answering | None = None,
@@ -131,8 +126,7 @@ def perform_on(
     Raises:
         WrongUse: the wall clock is before the end of the last step; nothing has moved.
     """
-    run = RunFiles(recording)
-    offset = clock_offset_ns(bench.simulated_clock or now)
+    recording, offset = run.recording, clock_offset_ns(bench.simulated_clock or now)
     recording.begin_session(offset, is_simulated=bench.simulated_clock is not None)
     helpers = Helpers(twin_of(run.scene, run.station, run.mesh), ask, say)
     if answering is not None:
@@ -158,9 +152,5 @@ class _Reading:
     def ended(self, step: Step, seconds: float) -> None:
         self.last = now()
         self._progress.ended(step, seconds)
-        if self._answering is None:
-            return
-        self._answering.read(self._recording.step(step.index))
-        if step.index < _REHEARSED_ANSWERS:
-            with suppress(FitRefused, WrongUse):  # as few steps may say too little
-                self._answering.answer()
+        if self._answering is not None:
+            self._answering.read(self._recording.step(step.index))

@@ -8,12 +8,13 @@ import subprocess
 import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from harness.basics.arrays import BoolArray
 from harness.basics.clock import clock_offset_ns
 from harness.basics.errors import RecordingDamaged, WrongUse
 from harness.basics.files.lock_file import hold_folder
@@ -30,7 +31,12 @@ from harness.effects.catalogue import network_levels, senses_of
 from harness.effects.scene_object import known_file
 from harness.objectfile.file import ObjectFile, write_described
 from harness.objects.builtin import DESCRIPTION
+from harness.picture.object_mask import mask_by_background
+from harness.picture.square_pixels import aspect_stated
+from harness.recording.observation import Observation, look_pictures, observe_step
 from harness.recording.recording import HEADER, IN_USE, STEPS, Recording, RunHeader, require_unused
+from harness.recording.step_file import StepRecord
+from harness.sim.optics.inverse import GelReader
 from harness.sim.optics.lit_calibration import named_calibration, read_calibration, shadow_of
 from harness.sim.optics.pressed_gel import require_own
 from harness.sim.optics.tactile_calibration import TactileCalibration, save_calibration
@@ -170,6 +176,7 @@ class RunFiles:
     """A recording with what it carries, read on first use and checked against the hashes in ``run.json``."""
 
     recording: Recording
+    _silhouettes: dict[int, BoolArray | None] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def scene(self) -> SceneFile:
@@ -219,6 +226,35 @@ class RunFiles:
                 "sound.shapes = elements and touch.shapes = reference"
             )
         return ObjectFile.open(self._checked(_DESCRIBED).parent)
+
+    @cached_property
+    def gel_reader(self) -> GelReader:
+        """Reader of the gel's pictures, shared by all that read this run."""
+        return GelReader(self.calibration)
+
+    def observe(self, record: StepRecord) -> Observation:
+        """Return one contact as it was recorded.
+
+        Raises:
+            RecordingDamaged: the step has no images, or no pose of the arm with them.
+        """
+        aspect = aspect_stated(self.calibration.header.made_from)
+        return observe_step(record, self.station.flange_from_gel, self.acquisition, aspect)
+
+    def silhouette(self, record: StepRecord) -> BoolArray | None:
+        """Return the object's pixels in the picture of a committed look; it is computed on first use.
+
+        Returns:
+            ``(rows, columns)``; None if the step is not a look.
+
+        Raises:
+            DataRefused: the pictures with and without the object differ in size.
+        """
+        index = record.step.index
+        if index not in self._silhouettes:
+            pictures = look_pictures(record)
+            self._silhouettes[index] = None if pictures is None else mask_by_background(*pictures)
+        return self._silhouettes[index]
 
     @property
     def carries_objectfile(self) -> bool:

@@ -26,8 +26,8 @@ def answer(run: str | Path, levels: Sequence[str] = ()) -> dict[str, Any]:
         RecordingDamaged: a step or a file of it is not what was recorded.
         FitRefused: nothing explains the readings.
     """
-    recording = Recording(Path(run))
-    experiment = experiment_of(recording)
-    accuracy = chosen_levels(experiment.knobs, levels, RunFiles(recording).network_levels)
-    scored = score(experiment, recording, accuracy)
+    files = RunFiles(Recording(Path(run)))
+    experiment = experiment_of(files.recording)
+    accuracy = chosen_levels(experiment.knobs, levels, files.network_levels)
+    scored = score(experiment, files, accuracy)
     return {**common(experiment, scored), **scored.result}

@@ -8,6 +8,7 @@ import pytest
 from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import finish
 from harness.experiment.lookup import named
+from harness.recording.run_folder import RunFiles
 from tests.docs.reference import FOLDER, pages
 from tests.docs.result_keys import ASKED, COMMON, ESTIMATE, LOCALIZATION
 from tests.support.whole_run import in_process_run, touch_scene
@@ -31,7 +32,7 @@ def test_a_result_has_the_keys_that_the_page_lists(tmp_path: Path) -> None:
     def page(*_: Any) -> Path:
         return tmp_path / "page.html"
 
-    found = finish(experiment, recording, Accuracy.default(experiment.knobs), page)
+    found = finish(experiment, RunFiles(recording), Accuracy.default(experiment.knobs), page)
     assert set(found) == {*COMMON, *LOCALIZATION}
     assert not set(found) & set(ASKED)
     (estimate,) = found["estimates"].values()

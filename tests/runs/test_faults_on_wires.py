@@ -89,7 +89,7 @@ def resume(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
         failed: dict[str, Any] = {}
 
         def faulty(
-            kind: Experiment, bench: Bench, run: Recording, progress: Progress, *others: Any
+            kind: Experiment, bench: Bench, run: RunFiles, progress: Progress, *others: Any
         ) -> Performed:
             try:
                 return perform_on(kind, bench, run, Cued(progress, bench, fault), *others)

@@ -15,8 +15,8 @@ from tests.support.whole_run import SPOILED, with_spoiled_pictures
 def test_a_spoiled_picture_is_named_and_the_rest_answers(done: Recording, tmp_path: Path, how: str) -> None:
     spoiled = with_spoiled_pictures(done, tmp_path / "run", how, 1)
     scored = session_of.score(spoiled, chosen(["localization.senses=touch"]))
-    assert list(scored.found.refused_pictures) == [1]
-    assert not scored.found.heights[1].any()
+    assert list(scored.found.readings.refused_pictures) == [1]
+    assert not scored.found.readings.gels[1].height.any()
     assert any(one.startswith("contact 2: ") for one in scored.result["warnings"])
     assert "left out" in scored.result["estimates"]["touch"]["contacts"][1]["flags"][0]
     assert scored.result["estimates"]["touch"]["error_m"] < 0.02

@@ -10,13 +10,9 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 
-from experiments.contact_localization import answer as answer_module
-from experiments.contact_localization.answer import located
-from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import result_of
 from harness.agreement.compare_run import agreement_of
 from harness.cli import invoke
@@ -27,7 +23,7 @@ from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.sim.optics.optics import Optics
 from tests.support import sessions as session_of
-from tests.support.localization import answer, chosen
+from tests.support.localization import chosen
 from tests.support.whole_run import copied
 
 KERNELS = (
@@ -258,24 +254,3 @@ def test_a_replay_takes_the_levels_of_the_runs_own_result(
     said = capsys.readouterr()
     assert "levels" in said.err
     assert json.loads(said.out)["accuracy"] == dict(chosen([]))
-
-
-@pytest.mark.parametrize("compiles", [True, False])
-def test_an_answers_seconds_are_those_with_every_kernel_loaded(
-    done: Recording, monkeypatch: pytest.MonkeyPatch, compiles: bool
-) -> None:
-    """The first answer of a process loads kernels; where it does, the same one is timed again."""
-    run, quick = RunFiles(done), chosen(["localization.rounds=1", "localization.samples=600"])
-    asked: list[Estimate] = []
-
-    def first(*arguments: Any, **named: Any) -> tuple[Estimate, ...]:
-        if compiles:
-            numba.njit(lambda number: number + 1)(len(asked))
-        asked.append(located(*arguments, **named)[-1])
-        return (replace(asked[-1], seconds={"images": 1e6} if len(asked) == 1 else {"images": 1.0}),)
-
-    answer(run, quick)  # loads what it needs
-    monkeypatch.setattr(answer_module, "located", first)
-    found = answer(run, quick)
-    assert found.seconds == (1.0 if compiles else 1e6)
-    assert np.array_equal(found.last.contacts, asked[0].contacts)

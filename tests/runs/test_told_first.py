@@ -10,6 +10,7 @@ from experiments.contact_localization.experiment import EXPERIMENT
 from harness.experiment import perform
 from harness.experiment.answer import RESULT, finish
 from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
 from mocks.in_process.bench import in_process_bench
 from tests.support.localization import chosen
@@ -31,7 +32,7 @@ def test_the_result_is_written_and_told_before_anything_is_drawn(
     with pytest.raises(RuntimeError, match="no further"):
         finish(
             EXPERIMENT,
-            done,
+            RunFiles(done),
             chosen([]),
             lambda *_: tmp_path,
             folder=tmp_path,
@@ -64,11 +65,11 @@ def test_a_run_is_concluded_while_its_bench_is_open(
     seen: list[tuple[bool, bool]] = []
     performed = perform.perform_on_bench(
         EXPERIMENT,
-        Recording(run.folder),
+        RunFiles(Recording(run.folder)),
         Quiet(),
         accuracy=chosen([]),
         conclude=lambda made: seen.append((made.complete, is_open[-1])),
     )
     assert seen == [(True, True)]
     assert performed.answering is not None
-    assert len(performed.answering.answer().observations) == 3
+    assert len(performed.answering.answer().readings.observations) == 3

@@ -87,7 +87,7 @@ def test_a_run_that_only_touches_calls_nothing_of_sound(tmp_path: Path) -> None:
         recording = in_process_run(tmp_path / "run", touch_scene(contacts=2), seed=3)
         scored = session_of.score(Recording(recording.folder), chosen([]))
     assert {name: count for name, count in calls.items() if name not in ALLOWED} == {}
-    assert scored.found.model.modes is None
+    assert scored.found.readings.model.modes is None
     assert list(scored.found.by_sense) == ["touch"]
     assert "sounds" not in scored.found.last.seconds
 

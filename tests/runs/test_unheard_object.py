@@ -59,7 +59,7 @@ def unfillable(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("unfillable")
 def test_touch_answers_and_the_result_says_why_sound_does_not(recording: Recording, tmp_path: Path) -> None:
-    written = write_answer(EXPERIMENT, recording, chosen([]), tmp_path)
+    written = write_answer(EXPERIMENT, RunFiles(recording), chosen([]), tmp_path)
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["answer"] == "touch"
     assert np.isfinite(result["estimates"]["touch"]["position_m"]).all()

@@ -71,7 +71,7 @@ class Side:
     def poses(self) -> FloatArray:
         """``(contacts, 4, 4)``, base_from_flange as recorded while pressed."""
         gel_from_flange = inverse(self.run.station.flange_from_gel)
-        return np.array([seen.base_from_gel @ gel_from_flange for seen in self.found.observations])
+        return np.array([seen.base_from_gel @ gel_from_flange for seen in self.found.readings.observations])
 
     def points(self) -> FloatArray:
         """``(contacts, 3)`` m, true."""
@@ -113,11 +113,12 @@ def shown(world: World, pose: FloatArray, step: int) -> ByteArray:
 
 def answered_where_the_wired_arm_was(wired: Side, world: World) -> Estimate:
     """The estimate from the pictures that the world in process shows there."""
+    read = wired.found.readings
     seen = tuple(
         Observation(observed.base_from_gel, shown(world, pose, step)[None])
-        for step, (observed, pose) in enumerate(zip(wired.found.observations, wired.poses, strict=True))
+        for step, (observed, pose) in enumerate(zip(read.observations, wired.poses, strict=True))
     )
-    return estimate(seen, wired.found.model, wired.found.prior, dials(), seed=SEED)
+    return estimate(seen, read.model, read.prior, dials(), seed=SEED)
 
 
 def distance(one: FloatArray, other: FloatArray) -> float:
@@ -135,7 +136,7 @@ def compare(name: str, scene: SceneFile, folder: Path) -> None:
     assert distance(points, wired.points()) < SAME_PLACE
     others = [
         np.mean(shown(world, pose, k) != frame)
-        for k, (pose, seen) in enumerate(zip(wired.poses, wired.found.observations, strict=True))
+        for k, (pose, seen) in enumerate(zip(wired.poses, wired.found.readings.observations, strict=True))
         for frame in seen.images
     ]
     assert max(others) < GREY_LEVELS

@@ -42,7 +42,7 @@ def opened(recording: Recording) -> Bench:
 
 def perform_on(bench: Bench, recording: Recording, progress: Progress) -> Performed:
     """What is left of a run, on an open bench."""
-    return perform.perform_on(procedure(), bench, recording, progress)
+    return perform.perform_on(procedure(), bench, RunFiles(recording), progress)
 
 
 def performed(folder: Path, presses: int = 15, seed: int = 1, gap: str | None = None) -> Recording:

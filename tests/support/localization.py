@@ -4,15 +4,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from experiments.contact_localization.accuracy.dials import KNOBS
-from experiments.contact_localization.answer import Answer, located, read
+from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.estimate import Estimate
+from experiments.contact_localization.posterior.policy import estimate_contacts, read
 from harness.effects.accuracy import Accuracy, Level
 from harness.experiment.answer import score
 from harness.experiment.levels import chosen_levels
 from harness.recording.observation import Observation
 from harness.recording.run_folder import RunFiles
+from harness.sim.optics.inverse import GelReader
 
 
 def dials(**levels: Level) -> Accuracy:
@@ -34,7 +36,7 @@ def chosen(texts: list[str]) -> Accuracy:
 
 def answer(run: RunFiles, accuracy: Accuracy) -> Answer:
     """What a whole recording says."""
-    found = score(EXPERIMENT, run.recording, accuracy).found
+    found = score(EXPERIMENT, run, accuracy).found
     assert isinstance(found, Answer)
     return found
 
@@ -47,4 +49,5 @@ def estimate(
     seed: int = 0,
 ) -> Estimate:
     """The last contact, from the images and strikes of all."""
-    return located(read(observations, model, prior, seed), accuracy or dials())[-1]
+    readings = read(observations, GelReader(model.calibration), model, prior, seed)
+    return estimate_contacts(readings, accuracy or dials())[-1]

@@ -15,6 +15,7 @@ from harness.experiment import answer, begin, perform
 from harness.experiment.experiment import Scored
 from harness.experiment.perform import Performed
 from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
 from harness.recording.session import Progress
 from harness.report.run_page import write_run_page
 
@@ -28,17 +29,17 @@ def start(
 
 def perform_on(bench: Bench, recording: Recording, progress: Progress) -> Performed:
     """What is left, on an open bench."""
-    return perform.perform_on(EXPERIMENT, bench, recording, progress)
+    return perform.perform_on(EXPERIMENT, bench, RunFiles(recording), progress)
 
 
 def perform_on_bench(recording: Recording, progress: Progress) -> Performed:
     """What is left, on the run's own bench."""
-    return perform.perform_on_bench(EXPERIMENT, recording, progress)
+    return perform.perform_on_bench(EXPERIMENT, RunFiles(recording), progress)
 
 
 def score(recording: Recording, accuracy: Accuracy) -> Scored:
     """The answer, held against the truth."""
-    return answer.score(EXPERIMENT, recording, accuracy)
+    return answer.score(EXPERIMENT, RunFiles(recording), accuracy)
 
 
 def finish(
@@ -49,4 +50,4 @@ def finish(
 ) -> dict[str, Any]:
     """The result, with its report."""
     draw = partial(write_run_page, EXPERIMENT)
-    return answer.finish(EXPERIMENT, recording, accuracy, draw, health, folder)
+    return answer.finish(EXPERIMENT, RunFiles(recording), accuracy, draw, health, folder)

@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.accuracy.budget import Run
-from experiments.contact_localization.accuracy.dials import HEARD, needs_images
+from experiments.contact_localization.accuracy.dials import HEARD
 from experiments.contact_localization.answer import (
     PROGRAM,
     Models,
-    Readings,
-    loaded,
+    load_kernels,
     observe,
     prepare,
     solve,
@@ -29,6 +28,8 @@ from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.model import Prior
 from experiments.contact_localization.plan import plan_contacts
 from experiments.contact_localization.posterior.baselines import mean_random_error
+from experiments.contact_localization.posterior.dials import needs_images
+from experiments.contact_localization.posterior.policy import Readings
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import TouchstoneError
 from harness.basics.geometry import rotation_about
@@ -49,6 +50,7 @@ from harness.picture.square_pixels import aspect_stated
 from harness.recording.observation import Observation, in_time, observe_step
 from harness.recording.run_folder import RunFiles, station_acquisition, station_calibration
 from harness.recording.step_file import Step, StepRecord
+from harness.sim.optics.inverse import GelReader
 from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
@@ -125,10 +127,9 @@ class Case:
         """Nothing: a case is in memory alone."""
 
     def readings(self, setting: Setting) -> Readings:
-        """As a setting takes them; timed on their second reading, when kernels are loaded."""
+        """As a setting takes them."""
         images = needs_images(setting)
         if images not in self._read:
-            self.run.read(setting)
             self._read[images] = self.run.read(setting)
         return self._read[images].under(self.run.models.at(setting))
 
@@ -136,8 +137,9 @@ class Case:
         """One setting from the first contacts: the error of the last of them, and the seconds."""
         readings = self.readings(setting).first(contacts)
         prepare(readings.model, setting)
+        load_kernels(readings.model, setting)
         with _uncollected():
-            solved = loaded(lambda: solve(readings, setting))
+            solved = solve(readings, setting)
         shared = readings.shared[0] if needs_images(setting) else 0.0
         error = self.error_of(solved, contacts)
         return Sample(
@@ -258,7 +260,8 @@ def _case(
         # Turned by chance, so that the unknown yaw falls between the grid's yaws, not on one of them.
         angle = float(np.random.default_rng((cell.seed, 11)).uniform(0.0, 2.0 * np.pi))
         prior = Prior(rotation_about(np.array([0.0, 0.0, 1.0]), angle) @ base_from_object, "unknown")
-    return Case(cell, Run(observations, own, prior, cell.seed, name), true_points, mesh)
+    run = Run(observations, GelReader(calibration), own, prior, cell.seed, name)
+    return Case(cell, run, true_points, mesh)
 
 
 def performed(

@@ -8,17 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.dials import (
-    FINEST,
-    SIMULATED,
-    needs_images,
-    needs_sound,
+from experiments.contact_localization.accuracy.dials import FINEST, SIMULATED, needs_sound
+from experiments.contact_localization.answer import (
+    Models,
+    load_kernels,
+    observe,
+    prepare,
+    prior_of,
+    solve,
 )
-from experiments.contact_localization.answer import Models, Readings, observe, prepare, prior_of, read, solve
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.dials import METHOD, SENSES, SPACING
+from experiments.contact_localization.posterior.dials import SPACING, needs_images
 from experiments.contact_localization.posterior.noise import noise_at
+from experiments.contact_localization.posterior.policy import Readings, read
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.section import Localization
 from experiments.contact_localization.touch.touch import Contact
@@ -34,6 +37,7 @@ from harness.experiment.subjects import object_key
 from harness.experiment.truth import read_truth
 from harness.recording.observation import Observation
 from harness.recording.run_folder import RunFiles
+from harness.sim.optics.inverse import GelReader
 
 SHIPPED = "data/cost.json"
 
@@ -52,6 +56,7 @@ class Run:
     """What an answer is made from."""
 
     observations: tuple[Observation, ...]  #: of the contacts.
+    reader: GelReader  #: reader of their pictures.
     models: Models  #: of the object.
     prior: Prior  #: of its orientation.
     seed: int  #: of the draws.
@@ -64,13 +69,9 @@ class Run:
         return _UNHEARD if needs_sound(setting) and not heard else None
 
     def load(self, settings: Sequence[Setting]) -> None:
-        """Answer two contacts by each sense and method."""
-        struck = [observation for observation in self.observations if observation.strike is not None]
-        few = (struck or list(self.observations))[:2]  # one strike says nothing, and is not weighed
-        kinds = {(setting.get(SENSES.name), setting[METHOD.name]): setting for setting in settings}
-        for setting in kinds.values():
-            images = needs_images(setting)
-            solve(read(few, self.models.at(setting), self.prior, self.seed, images), setting)
+        """Load the kernels of each sense and method."""
+        for setting in settings:
+            load_kernels(self.models.at(setting), setting)
 
     def prepare(self, setting: Setting) -> None:
         """The object's samples and modes."""
@@ -88,7 +89,10 @@ class Run:
 
     def read(self, setting: Setting) -> Readings:
         """Its readings as a setting takes them."""
-        return read(self.observations, self.models.at(setting), self.prior, self.seed, needs_images(setting))
+        model = self.models.at(setting)
+        if needs_images(setting):
+            return read(self.observations, self.reader, model, self.prior, self.seed)
+        return Readings(self.observations, (), model, self.prior, self.seed)
 
     def solve(self, readings: Readings, setting: Setting) -> Solved:
         """Its readings, compared with the object as a setting models it."""
@@ -110,6 +114,7 @@ def run_of(files: RunFiles) -> Run:
     recording, truth = files.recording, read_truth(files.recording)
     return Run(
         observe(files),
+        files.gel_reader,
         Models(lambda accuracy: model_of_run(files, accuracy), files.network_levels),
         prior_of(files),
         recording.header.seed,

@@ -155,11 +155,6 @@ def setting_name(setting: Mapping[str, Level]) -> str:
     return ", ".join(said)
 
 
-def needs_images(setting: Mapping[str, Level]) -> bool:
-    """Whether a setting looks at the tactile images."""
-    return setting.get(SENSES.name, SENSES.default) != "audio"
-
-
 def needs_sound(setting: Mapping[str, Level]) -> bool:
     """Whether a setting was measured on runs that were heard; one that names no sense was not."""
     return setting.get(SENSES.name, "touch") != "touch"

@@ -16,21 +16,21 @@ from experiments.contact_localization.accuracy.benchmark_runs import (
 )
 from experiments.contact_localization.accuracy.dials import (
     accuracy_at,
-    needs_images,
     setting_name,
     settings,
     settings_by_count,
 )
-from experiments.contact_localization.answer import ESTIMATOR, Readings, solve
+from experiments.contact_localization.answer import ESTIMATOR, solve
 from experiments.contact_localization.posterior.baselines import (
     MfccTable,
     mean_random_error,
     mfcc_filter,
     without_images,
 )
-from experiments.contact_localization.posterior.dials import METHOD, PARTICLES, SENSES, SPACING
+from experiments.contact_localization.posterior.dials import METHOD, PARTICLES, SENSES, SPACING, needs_images
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.posterior.noise import noise_at
+from experiments.contact_localization.posterior.policy import Readings
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.report.result import fit_of
 from experiments.contact_localization.touch.touch import Contact

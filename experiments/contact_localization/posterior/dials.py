@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from harness.effects.accuracy import Knob
+from harness.effects.accuracy import Knob, Setting
 
 Method = Literal["grid", "particle"]
 """The exact posterior refined, or the paper's filter."""
@@ -36,3 +36,8 @@ PARTICLES = Knob(
 BLOCK = Knob("localization.block", (16, 8), "pixels", "number", 8, "tactile pixels averaged, each way")
 
 DIALS = (SENSES, METHOD, SPACING, ROUNDS, SAMPLES, PARTICLES, BLOCK)
+
+
+def needs_images(setting: Setting) -> bool:
+    """Whether a setting uses the tactile images."""
+    return setting.get(SENSES.name, SENSES.default) != "audio"

@@ -1,19 +1,24 @@
 """Fill the report of a run from its folder, its answer and, for a mocked run, its truth."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.dials import accuracy_at, by_sound, grid, particles
-from experiments.contact_localization.answer import Answer, Readings, loaded, prepare, solve
+from experiments.contact_localization.accuracy.dials import setting_name
+from experiments.contact_localization.answer import PROGRAM, Answer
 from experiments.contact_localization.answer import Answer as Found
 from experiments.contact_localization.next_contact import EXPECTED
 from experiments.contact_localization.posterior.consistency import Gate
-from experiments.contact_localization.posterior.dials import METHOD, Senses
+from experiments.contact_localization.posterior.dials import (
+    DIALS,
+    METHOD,
+    PARTICLES,
+    ROUNDS,
+    SAMPLES,
+    Senses,
+)
 from experiments.contact_localization.posterior.dials import SENSES as BY
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import by_translations, flags_of, true_points
@@ -23,10 +28,11 @@ from harness.basics.arrays import AnyArray, FloatArray, read_only
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import inverse, rotation_from_quaternion, transform, translation
 from harness.bench.device import Health
-from harness.effects.accuracy import Accuracy, Setting
 from harness.effects.quantities import Quantities
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
+from harness.experiment.front import front_at_hand
+from harness.experiment.lookup import named
 from harness.recording.run_folder import RunFiles
 from harness.report.data import (
     AnswerRow,
@@ -48,40 +54,6 @@ from harness.twin.compare import compare_arm, compare_contact
 from harness.twin.rehearsal import predict_contact
 
 
-@dataclass(frozen=True)
-class SweepPoint:
-    """One level of accuracy on one recording."""
-
-    name: str  #: of the level.
-    accuracy: Accuracy  #: the dials.
-    seconds_a_contact: float  #: of the estimate, samples of the surface prepared.
-    error: float  #: m, of the last contact.
-
-
-LEVELS: dict[str, Setting] = {
-    "4 mm, no refinement": grid("both", 4e-3, 0, 3000, 8),
-    "3 mm, no refinement": grid("both", 3e-3, 0, 3000, 8),
-    "2 mm, no refinement": grid("both", 2e-3, 0, 3000, 8),
-    "2 mm, refined once": grid("both", 2e-3, 1, 3000, 8),
-    "2 mm, refined": grid("both", 2e-3, 5, 3000, 8),
-    "1.5 mm, refined": grid("both", 1.5e-3, 5, 6000, 8),
-    "300 particles": particles(300, 2e-3, 8),
-    "1,000 particles": particles(1000, 2e-3, 8),
-    "3,000 particles": particles(3000, 2e-3, 8),
-}
-"""What the report tries, by name, from cheap to exact for each method; `touchstone cost` tries more."""
-
-
-BY_SENSE: dict[str, Setting] = {
-    "touch: 4 mm, no refinement": grid("touch", 4e-3, 0, 3000, 8),
-    "touch: 2 mm, no refinement": grid("touch", 2e-3, 0, 3000, 8),
-    "touch: 2 mm, refined": grid("touch", 2e-3, 5, 3000, 8),
-    "sound: 4 mm": by_sound(4e-3),
-    "sound: 2 mm": by_sound(2e-3),
-}
-"""What is tried beside where contacts were struck, so that each sense is seen alone."""
-
-
 def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path) -> Path:
     """Draw the report; the path of its page."""
     return write_report(report_of(scored, comparison, health), folder)
@@ -95,7 +67,7 @@ def report_of(scored: Scored, comparison: Comparison, health: Mapping[str, Healt
         comparison: what the scene observes, simulated at the answer.
         health: of the instruments at the end of the session; None for a replay.
     """
-    run, found, true = scored.run, scored.found, true_points(scored)
+    run, found = scored.run, scored.found
     # The estimator's side of what the world did differently.
     ours = {
         "mesh_vertices, the estimator's": str(len(run.mesh.vertices)),
@@ -111,7 +83,7 @@ def report_of(scored: Scored, comparison: Comparison, health: Mapping[str, Healt
         contacts=_contacts(scored, comparison, history),
         bench=_bench(run, found),
         error_by_contact=_by_contact(scored, history),
-        error_by_seconds=_by_seconds(() if true is None else trade(scored.answering.readings, true[-1])),
+        error_by_seconds=_by_seconds(scored),
         twin=deviations(run, found),
         sound=sound_of(scored),
         symmetry=scored.answering.symmetry.name,
@@ -143,20 +115,20 @@ def _contacts(
     touch = comparison.evaluation.touch
     images, gels = _of_each(touch.image, "touch.image", count), _of_each(touch.gel, "touch.gel", count)
     gates: tuple[Gate | None, ...] = scored.found.last.gates or (None,) * count
-    poses, true = object_from_gels(scored.found), true_points(scored)
+    poses, true, readings = object_from_gels(scored.found), true_points(scored), scored.found.readings
     return tuple(
         ContactRow(
             number=k + 1,
             step=str(k + 1),
-            live=scored.found.observations[k].images[-1],
+            live=readings.observations[k].images[-1],
             simulated=images[k],
-            live_height=scored.found.heights[k],
+            live_height=readings.gels[k].height,
             simulated_height=gels[k],
             object_from_gel=poses[k],
             posterior=Missing(str(after)) if isinstance(after, FitRefused) else posterior_of(after),
             truth=None if true is None else true[k],
             error=None if true is None else _error(after, true[k]),
-            flags=() if gate is None else tuple(flags_of(gate, scored.found.refused_pictures.get(k))),
+            flags=() if gate is None else tuple(flags_of(gate, readings.gels[k].refusal)),
             notes=(("fit", _fit(gate)), *_expected(scored.run, k)),
         )
         for k, (after, gate) in enumerate(zip(history, gates, strict=True))
@@ -194,8 +166,8 @@ def _expected(run: RunFiles, contact: int) -> tuple[tuple[str, str], ...]:
 def _bench(run: RunFiles, found: Found) -> BenchScene:
     station, scene = run.station, run.scene
     base_from_object = scene.base_from_object(run.mesh)
-    base_from_gels = np.array([observation.base_from_gel for observation in found.observations])
-    joints = run.recording.step(len(found.observations) - 1).readings["arm.joints"].values[-1]
+    base_from_gels = np.array([observation.base_from_gel for observation in found.readings.observations])
+    joints = run.recording.step(len(found.readings.observations) - 1).readings["arm.joints"].values[-1]
     corners = run.mesh.bounds
     in_base = base_from_object[:3, :3] @ corners.T + base_from_object[:3, 3:]
     parts = (
@@ -237,47 +209,28 @@ def _curve(sense: Senses, history: tuple[Estimate | FitRefused, ...], true: Floa
     return ErrorCurve(SENSES[sense], tuple(known), tuple(known.values()), by=sense)
 
 
-def _by_seconds(tried: tuple[SweepPoint, ...]) -> tuple[ErrorCurve, ...] | Missing:
-    if not tried:
+def _by_seconds(scored: Scored) -> tuple[ErrorCurve, ...] | Missing:
+    """Return error and seconds of each sense's answer, and those measured at its levels on other runs."""
+    true, run = true_points(scored), scored.run
+    if true is None:
         return NO_TRUTH
-    methods: dict[tuple[str, str], list[SweepPoint]] = {}
-    heard = any(point.accuracy.of(BY) == "audio" for point in tried)
-    for point in tried:
-        sense = point.accuracy.of(BY)
-        if point.accuracy.of(METHOD) == "particle":
-            method = "the paper's particle filter", "particle"
-        else:
-            method = (f"grid, {SENSES[sense]}", sense) if heard else ("grid", "touch")
-        methods.setdefault(method, []).append(point)
-    return tuple(
-        ErrorCurve(
-            name,
-            tuple(point.seconds_a_contact for point in points),
-            tuple(point.error for point in points),
-            tuple(point.name for point in points),
-            by=by,
-        )
-        for (name, by), points in methods.items()
-    )
-
-
-def trade(readings: Readings, true: FloatArray) -> tuple[SweepPoint, ...]:
-    """Estimate the same readings again at every level; a level that refuses the fit is left out.
-
-    Args:
-        readings: of the run, its images read once.
-        true: ``(3,)`` metres, the last contact.
-    """
-    points = []
-    for name, setting in (LEVELS | BY_SENSE if readings.heard else LEVELS).items():
-        prepare(readings.model, setting)
-        solved = loaded(partial(solve, readings, setting))
-        if solved.found is None:
+    count, front = len(true), front_at_hand(named(PROGRAM), run)
+    unused = (PARTICLES,) if scored.accuracy.of(METHOD) == "grid" else (ROUNDS, SAMPLES)
+    curves = []
+    for sense, last in {scored.found.sense: scored.found.last, **scored.found.others}.items():
+        if isinstance(last, FitRefused):
             continue
-        seconds = (readings.shared[1] + solved.wall) / len(readings.observations)
-        error = float(np.linalg.norm(solved.found.position_in_object - true))
-        points.append(SweepPoint(name, accuracy_at(setting), seconds, error))
-    return tuple(points)
+        levels = {**scored.accuracy, BY.name: sense}
+        label = setting_name({knob.name: levels[knob.name] for knob in DIALS if knob not in unused})
+        seconds, error = sum(last.seconds.values()) / count, _error(last, true[-1])
+        assert error is not None
+        curves.append(ErrorCurve(SENSES[sense], (seconds,), (error,), (label,), by=sense))
+        point = None if front is None else front.at(levels)
+        if front is not None and point is not None:
+            mean = float(np.exp(np.log(point.wall_seconds).mean())) / front.steps
+            name = f"{SENSES[sense]}, mean of {len(point.samples)} measured runs"
+            curves.append(ErrorCurve(name, (mean,), (point.error.value,), (point.name,), by=sense))
+    return tuple(curves)
 
 
 _MOST_POSES = 200
@@ -288,7 +241,7 @@ def deviations(run: RunFiles, found: Answer) -> tuple[TwinDeviation, ...]:
     bench = twin_of(run.scene, run.station, run.mesh)
     planned = run.recording.header.plan.get("pressed", [])
     rows = []
-    for index, observation in enumerate(found.observations):
+    for index, observation in enumerate(found.readings.observations):
         readings = run.recording.step(index).readings
         joints, poses = readings["arm.joints"].values, readings["arm.base_from_flange"].values
         count = min(len(joints), len(poses))
@@ -326,13 +279,13 @@ def sources(scored: Scored) -> Quantities:
 
 def object_from_gels(found: Answer) -> FloatArray:
     """``(contacts, 4, 4)``: each gel as deep behind its estimated contact as its own images say."""
-    object_from_base = found.prior.object_from_base(np.array([found.last.yaw]))[0]
+    object_from_base = found.readings.prior.object_from_base(np.array([found.last.yaw]))[0]
     poses = []
-    for observation, point, height in zip(
-        found.observations, found.last.contacts, found.heights, strict=True
+    for observation, point, gel in zip(
+        found.readings.observations, found.last.contacts, found.readings.gels, strict=True
     ):
         rotation = object_from_base @ observation.base_from_gel[:3, :3]
-        rows, columns = height.shape
-        middle = height[(rows - 1) // 2 : rows // 2 + 1, (columns - 1) // 2 : columns // 2 + 1]
+        rows, columns = gel.height.shape
+        middle = gel.height[(rows - 1) // 2 : rows // 2 + 1, (columns - 1) // 2 : columns // 2 + 1]
         poses.append(transform(rotation, point + float(middle.mean()) * rotation[:, 2]))
     return read_only(np.array(poses))

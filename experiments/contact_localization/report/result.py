@@ -29,7 +29,7 @@ _LEFT_OUT = "its picture is left out"
 
 def true_points(scored: Scored) -> FloatArray | None:
     """``(contacts, 3)`` metres, None where any is unknown."""
-    count = len(scored.found.observations)
+    count = len(scored.found.readings.observations)
     if scored.truth is None or not all(k in scored.truth.points for k in range(count)):
         return None
     return np.array([scored.truth.points[k] for k in range(count)])
@@ -41,12 +41,12 @@ def result_of(scored: Scored) -> dict[str, Any]:
     true = true_points(scored)
     last_true = None if true is None else true[-1]
     random = geometry = None
-    by_places = by_translations(found, len(found.observations))
+    by_places = by_translations(found, len(found.readings.observations))
     if last_true is not None:
         random = mean_random_error(scored.run.mesh, last_true)
         geometry = float(np.linalg.norm(by_places - last_true))
     return {
-        "contacts": len(found.observations),
+        "contacts": len(found.readings.observations),
         "estimates": {
             sense: {"refused": str(one)} if isinstance(one, FitRefused) else estimate_of(scored, one)
             for sense, one in found.by_sense.items()
@@ -62,14 +62,14 @@ def result_of(scored: Scored) -> dict[str, Any]:
 
 def by_translations(found: Answer, count: int) -> FloatArray:
     """``(3,)`` metres: the last of the first ``count`` contacts, from the arm's translations alone."""
-    poses = [observation.base_from_gel for observation in found.observations[:count]]
-    return without_images(poses, found.model, found.prior, SPACING.default)
+    poses = [observation.base_from_gel for observation in found.readings.observations[:count]]
+    return without_images(poses, found.readings.model, found.readings.prior, SPACING.default)
 
 
 def _doubts(found: Answer, symmetry: SymmetryGroup) -> tuple[str, ...]:
-    refusal = found.model.sound_refusal
-    of_sound = (f"{_NO_SOUND}: {refusal}",) if refusal else doubts_of_sound(found.observations)
-    pictures = found.refused_pictures.items()
+    refusal = found.readings.model.sound_refusal
+    of_sound = (f"{_NO_SOUND}: {refusal}",) if refusal else doubts_of_sound(found.readings.observations)
+    pictures = found.readings.refused_pictures.items()
     of_sound = (*(f"contact {k + 1}: {_LEFT_OUT}: {why}" for k, why in pictures), *of_sound)
     # Sense by sense the doubt may be the same one.
     of_senses = [estimate.doubts for estimate in found.by_sense.values() if isinstance(estimate, Estimate)]
@@ -77,10 +77,11 @@ def _doubts(found: Answer, symmetry: SymmetryGroup) -> tuple[str, ...]:
     if len(found.last.modes) < 2:
         return of_sound
     shares = ", ".join(f"{100 * mode.weight:.0f} %" for mode in found.last.modes)
+    places, mesh = [mode.position for mode in found.last.modes], found.readings.model.mesh
     return (
         *of_sound,
         f"the answer is ambiguous: {len(found.last.modes)} places stay likely ({shares}); "
-        f"{further_contact([mode.position for mode in found.last.modes], symmetry, found.model.mesh)}",
+        f"{further_contact(places, symmetry, mesh)}",
     )
 
 
@@ -106,7 +107,7 @@ def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
     """An estimate by one sense or by both, scored where the truth is known."""
     true = true_points(scored)
     errors = None if true is None else np.linalg.norm(last.contacts - true, axis=1)
-    end, refused = None if true is None else true[-1], scored.found.refused_pictures
+    end, gels = None if true is None else true[-1], scored.found.readings.gels
     return {
         "position_m": last.position_in_object.tolist(),
         "error_m": None if errors is None else float(errors[-1]),
@@ -134,7 +135,7 @@ def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
                 "position_m": point.tolist(),
                 "error_m": None if errors is None else float(errors[k]),
                 "fit_nats": fit_of(last.gates[k]) if last.gates else None,
-                "flags": flags_of(last.gates[k], refused.get(k)) if last.gates else [],
+                "flags": flags_of(last.gates[k], gels[k].refusal) if last.gates else [],
             }
             for k, point in enumerate(last.contacts)
         ],
@@ -143,15 +144,15 @@ def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
     }
 
 
-def flags_of(gate: Gate, refusal: str | None = None) -> list[str]:
+def flags_of(gate: Gate, refusal: str = "") -> list[str]:
     """What is wrong with a contact, in words.
 
     Args:
         gate: how it fits.
-        refusal: why its picture is left out; None where it is not.
+        refusal: reason why its picture is not used; empty if it is.
     """
     said = []
-    if refusal is not None:
+    if refusal:
         said.append(f"{_LEFT_OUT}: {refusal}")
     elif gate.missed:
         said.append("missed: the image shows no contact; it was not used")

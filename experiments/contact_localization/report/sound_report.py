@@ -34,11 +34,11 @@ def sound_of(scored: Scored) -> Sound | Missing:
     found = scored.found
     if not scored.run.scene.sensors.sound:
         return Missing("the scene called for no sound")
-    if found.model.sound_refusal:
-        return Missing(found.model.sound_refusal)
+    if found.readings.model.sound_refusal:
+        return Missing(found.readings.model.sound_refusal)
     heard = hear(
-        [observation.strike for observation in found.observations],
-        found.model,
+        [observation.strike for observation in found.readings.observations],
+        found.readings.model,
         float(scored.accuracy[SPACING.name]),
         alone=not found.last.gates,
     )
@@ -50,7 +50,7 @@ def sound_of(scored: Scored) -> Sound | Missing:
         senses=_senses(scored),
         strikes=tuple(
             strike_line(index + 1, observation.strike, reasons.get(index, NOT_STRUCK))
-            for index, observation in enumerate(found.observations)
+            for index, observation in enumerate(found.readings.observations)
         ),
         pair=_pair(found, heard),
         peaks=_peaks(found, heard),
@@ -128,7 +128,8 @@ def _pair(found: Answer, heard: StrikeEvidence) -> SpectrogramPair | Missing:
     if not len(counted):
         return Missing("no strike counts")
     index = int(counted[-1])
-    strike, modes, material = found.observations[index].strike, found.model.modes, found.model.material
+    strike, model = found.readings.observations[index].strike, found.readings.model
+    modes, material = model.modes, model.material
     assert strike is not None
     assert modes is not None
     assert material is not None
@@ -147,8 +148,8 @@ def _scale(found: Answer, heard: StrikeEvidence) -> float:
 
 def _directions(found: Answer, contacts: Sequence[int]) -> FloatArray:
     """``(K, 3)`` unit, in the object's frame: where the hammer went, under the answer's yaw."""
-    object_from_base = found.prior.object_from_base(np.array([found.last.yaw]))[0]
-    axes = np.array([found.observations[k].base_from_gel[:3, 2] for k in contacts])
+    object_from_base = found.readings.prior.object_from_base(np.array([found.last.yaw]))[0]
+    axes = np.array([found.readings.observations[k].base_from_gel[:3, 2] for k in contacts])
     return np.asarray(axes @ object_from_base.T)
 
 

@@ -34,7 +34,7 @@ class PlannedRun:
     """A run whose folder is there."""
 
     experiment: Experiment  #: that it is of.
-    recording: Recording  #: its folder.
+    files: RunFiles  #: its folder.
     accuracy: Accuracy  #: of the answer, where no target chooses it.
     target: Target | None  #: a budget or an error that the answer is to keep; None where levels are given.
 
@@ -77,7 +77,7 @@ def new_run(
             )
     begun = begin(experiment, wanted, station, bench.seed, bench.gap, bench.out, bench.bench, target)
     _describe(experiment, begun, accuracy)
-    return PlannedRun(experiment, begun.recording, accuracy, target)
+    return PlannedRun(experiment, RunFiles(begun.recording), accuracy, target)
 
 
 def resumed_run(
@@ -120,7 +120,7 @@ def resumed_run(
         CONSOLE.print(foresee(kind, files.scene, target), markup=False)
     if target is None and not levels:
         target = target_of(recording.header.plan)
-    return PlannedRun(kind, recording, accuracy, target)
+    return PlannedRun(kind, files, accuracy, target)
 
 
 def target_of_options(budget: str | None, error: str | None, levels: Sequence[str]) -> Target | None:
@@ -180,13 +180,13 @@ def perform_and_answer(run: PlannedRun, as_json: bool) -> int:
     Raises:
         TouchstoneError: of the bench, or of the answer; what was recorded is kept.
     """
-    experiment, recording, written = run.experiment, run.recording, list[WrittenAnswer]()
+    experiment, recording, written = run.experiment, run.files.recording, list[WrittenAnswer]()
     draw, publish = partial(write_run_page, experiment), publisher(experiment, as_json)
 
     def conclude(done: Performed) -> None:
         if run.target is None:
             rest = recording.folder, done.answering, publish
-            written.append(write_answer(experiment, recording, run.accuracy, *rest, since=done.ended))
+            written.append(write_answer(experiment, run.files, run.accuracy, *rest, since=done.ended))
 
     with recording.hold():
         done = _performed(run, as_json, conclude)
@@ -202,7 +202,7 @@ def perform_and_answer(run: PlannedRun, as_json: bool) -> int:
             rest = accuracy, draw, health
             result = finish(
                 experiment,
-                recording,
+                run.files,
                 *rest,
                 answering=done.answering,
                 publish=publish,
@@ -216,11 +216,11 @@ def perform_and_answer(run: PlannedRun, as_json: bool) -> int:
 def _cost_of_target(run: PlannedRun) -> dict[str, Any]:
     """The levels that keep the target, and what they cost; doubts and cost are printed."""
     assert run.target is not None
-    front = front_for(run.experiment, RunFiles(run.recording).scene, run.recording.committed)
+    front = front_for(run.experiment, run.files.scene, run.files.recording.committed)
     for doubt in doubts(run.experiment, front, run.target):
         warn(doubt)
     with CONSOLE.status("estimating as asked, then at the finest levels"):
-        cost = answer_as_asked(run.experiment, run.recording, front, run.target)
+        cost = answer_as_asked(run.experiment, run.files, front, run.target)
     for sentence in sentences(run.experiment, cost):
         CONSOLE.print(sentence, markup=False)
     return cost
@@ -228,24 +228,24 @@ def _cost_of_target(run: PlannedRun) -> dict[str, Any]:
 
 def _performed(run: PlannedRun, as_json: bool, conclude: Callable[[Performed], None]) -> Performed:
     """What is left of the run; where no target chooses the levels, readings are taken in on the way."""
-    total = steps_planned(run.experiment, run.recording)
-    if run.recording.committed == total:
+    total = steps_planned(run.experiment, run.files.recording)
+    if run.files.recording.committed == total:
         return Performed(True, {})  # nothing is left to touch: no bench is opened
-    CONSOLE.print(f"bench: {describe_bench(run.recording)}", markup=False)
-    CONSOLE.print(f"recording to {run.recording.folder}", markup=False)
+    CONSOLE.print(f"bench: {describe_bench(run.files.recording)}", markup=False)
+    CONSOLE.print(f"recording to {run.files.recording.folder}", markup=False)
     accuracy: Accuracy | None = run.accuracy if run.target is None else None
     with (
         resumable(_resuming(run)),
-        step_progress(run.recording.committed, total, run.experiment.step) as progress,
+        step_progress(run.files.recording.committed, total, run.experiment.step) as progress,
     ):
         ask = None if as_json else partial(CONSOLE.print, markup=False, style="bold")
-        given = run.experiment, run.recording, progress, ask, accuracy
+        given = run.experiment, run.files, progress, ask, accuracy
         return perform_on_bench(*given, say=progress.say, conclude=conclude)
 
 
 def _resuming(run: PlannedRun) -> str:
     """The command that goes on with a run."""
-    return f"touchstone run {run.experiment.name} --resume {run.recording.folder}"
+    return f"touchstone run {run.experiment.name} --resume {run.files.recording.folder}"
 
 
 def publisher(experiment: Experiment, as_json: bool) -> Publish:

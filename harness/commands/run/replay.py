@@ -43,20 +43,21 @@ def replay(
     from harness.recording.wav_export import export_wav
     from harness.report.run_page import write_run_page
 
-    recording = Recording(run)
+    files = RunFiles(Recording(run))
+    recording = files.recording
     kind = experiment_of(recording)
     if wav is not None:
-        files = export_wav(recording, wav)
-        warn(f"{len(files)} WAV files in {wav}; counts, rates and times in wav.json beside them")
+        written = export_wav(recording, wav)
+        warn(f"{len(written)} WAV files in {wav}; counts, rates and times in wav.json beside them")
     try:
-        own = levels_of_result(kind, recording.folder) or RunFiles(recording).network_levels
+        own = levels_of_result(kind, recording.folder) or files.network_levels
     except RecordingDamaged as error:
-        own = RunFiles(recording).network_levels
+        own = files.network_levels
         warn(f"{error}; the default levels are taken")
     accuracy = chosen_levels(kind.knobs, level or [], own)
     folder = out or run.with_name(f"{run.name}-replay")
     draw = partial(write_run_page, kind)
     with hold_folder(folder):
-        result = finish(kind, recording, accuracy, draw, None, folder, None, publisher(kind, json))
+        result = finish(kind, files, accuracy, draw, None, folder, None, publisher(kind, json))
     show_report(result, json)
     return 0

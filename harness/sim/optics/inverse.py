@@ -5,7 +5,7 @@ compare it with ``gel.deform`` of a prediction, not with the prediction itself.
 """
 
 from dataclasses import dataclass
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 from scipy import ndimage
@@ -91,35 +91,61 @@ def mean_picture(frames: ByteArray) -> ByteArray:
     return np.asarray(np.rint(frames.mean(axis=0)), dtype=np.uint8)
 
 
-def invert_mean(frames: ByteArray, calibration: TactileCalibration) -> Inversion:
-    """The surface of a gel from the mean of a contact's frames, as ``invert`` of that one picture.
+@dataclass(frozen=True, eq=False)
+class GelReading:
+    """The surface of the gel in one contact, by the mean picture of its frames."""
+
+    height: FloatArray  #: ``(rows, columns)`` m of indentation; zeros if the picture is refused.
+    error: FloatArray  #: ``(rows, columns)`` m, one sigma of ``height``; zeros if the picture is refused.
+    refusal: str  #: reason why the picture is not used; empty if it is.
+    seconds: tuple[float, float]  #: CPU and wall time of the inversion in s.
+
+    def require_accepted(self) -> None:
+        """Raise ``PictureRefused`` if the picture is not what the calibration was made of."""
+        if self.refusal:
+            raise PictureRefused(self.refusal)
+
+
+class GelReader:
+    """Inverts each picture of a gel once, for all that use its reading.
 
     Args:
-        frames: ``(n, rows, columns, 3)`` RGB of one contact that was held still.
-        calibration: with a smooth model. Light that differs from its own by a gain a channel is corrected;
-            a picture that needs no correction is inverted as it is.
-
-    Raises:
-        DataRefused: frames of another shape or type than the calibration's.
-        PictureRefused: the mean picture is not what the calibration was made of.
-        CalibrationRefused: the calibration has only a table.
+        calibration: calibration of the gel, with a smooth model. Light that differs from its own by a gain
+            per channel is corrected; a picture that needs no correction is inverted as it is.
     """
-    return invert(
-        checked_picture(mean_picture(frames), calibration, allow_wide=True).image[None], calibration
-    )
 
+    def __init__(self, calibration: TactileCalibration) -> None:
+        _load_kernels(calibration)
+        self._calibration = calibration
+        self._readings: dict[tuple[tuple[int, ...], bytes], GelReading] = {}
 
-def heights_or_refusal(frames: ByteArray, calibration: TactileCalibration) -> tuple[FloatArray, str]:
-    """``(rows, columns)`` m of indentation by ``invert_mean``, and no text; zeros and why where it refuses.
+    def read(self, frames: ByteArray) -> GelReading:
+        """Return the surface of the gel; it is computed when a picture is first read.
 
-    Args:
-        frames: ``(n, rows, columns, 3)`` RGB of one contact that was held still.
-        calibration: with a smooth model.
-    """
-    try:
-        return np.asarray(invert_mean(frames, calibration).height[0]), ""
-    except PictureRefused as refusal:
-        return np.zeros(frames.shape[1:3]), str(refusal)
+        Args:
+            frames: ``(n, rows, columns, 3)`` RGB of one contact that was held still.
+
+        Raises:
+            DataRefused: frames of another shape or type than the calibration's.
+            CalibrationRefused: the calibration has only a table.
+        """
+        picture = mean_picture(frames)
+        key = picture.shape, picture.tobytes()
+        if key not in self._readings:
+            self._readings[key] = self._invert(picture)
+        return self._readings[key]
+
+    def _invert(self, picture: ByteArray) -> GelReading:
+        cpu, wall = process_time(), perf_counter()
+        refusal, height = "", read_only(np.zeros(picture.shape[:2]))
+        error = height
+        try:
+            shown = checked_picture(picture, self._calibration, allow_wide=True).image
+            found = invert(shown[None], self._calibration)
+            height, error = found.height[0], found.error[0]
+        except PictureRefused as reason:
+            refusal = str(reason)
+        return GelReading(height, error, refusal, (process_time() - cpu, perf_counter() - wall))
 
 
 def invert(images: ByteArray, calibration: TactileCalibration, detection: Detection = STEADY) -> Inversion:
@@ -158,6 +184,22 @@ def invert(images: ByteArray, calibration: TactileCalibration, detection: Detect
         read_only(anchored.astype(np.bool_)),
         perf_counter() - began,
     )
+
+
+_LOADED: set[bool] = set()
+"""True once this process has loaded the kernels of an inversion."""
+
+
+def _load_kernels(calibration: TactileCalibration) -> None:
+    """Compile or load the kernels, so that the seconds of no reading count it: invert a bright disc."""
+    if _LOADED or len(calibration.smooth) == 0:
+        return
+    _LOADED.add(True)
+    rows, columns = np.indices(calibration.background.shape[:2])
+    far = np.hypot(rows - rows.mean(), columns - columns.mean())
+    disc = np.where(far < 0.2 * rows.max(), 40.0, 0.0)[..., None]
+    picture = np.clip(calibration.background + disc, 0.0, 255.0).astype(np.uint8)
+    invert(picture[None], calibration)
 
 
 _Answer = tuple[FloatArray, BoolArray, BoolArray, BoolArray, FloatArray, bool]

@@ -24,7 +24,7 @@ from rich.console import Console
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, perform, scene_of
-from experiments.contact_localization.answer import Models, Readings, prepare, solve
+from experiments.contact_localization.answer import Models, prepare, solve
 from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.posterior.dials import (
     BLOCK,
@@ -35,6 +35,7 @@ from experiments.contact_localization.posterior.dials import (
     SPACING,
     Senses,
 )
+from experiments.contact_localization.posterior.policy import Readings
 from harness.basics.errors import TouchstoneError
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station, load_station, station_path
@@ -117,8 +118,7 @@ def _group(readings: Readings, count: int, first: int) -> Readings:
     return replace(
         readings,
         observations=tuple(readings.observations[k] for k in chosen),
-        heights=tuple(readings.heights[k] for k in chosen),
-        refused_pictures={k - first: why for k, why in readings.refused_pictures.items() if k in chosen},
+        gels=tuple(readings.gels[k] for k in chosen),
     )
 
 

@@ -15,7 +15,7 @@ from harness.bench.sensor import GELSIGHT_R15
 from harness.picture.square_pixels import made_square
 from harness.recording.observation import AROUND_IMAGES, Observation, observe_step
 from harness.recording.step_file import Step, StepRecord
-from harness.sim.optics.inverse import heights_or_refusal
+from harness.sim.optics.inverse import GelReader
 from harness.sim.optics.optics import Optics
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples.synthetic_press import BLOCK, Press, felt, stepped_block
@@ -29,9 +29,9 @@ EDGE = Press((0.008, -0.005, 0.025), (0.0, 0.0, -1.0), yaw=0.3)
 
 def height_map(observation: Observation, model: Model) -> FloatArray:
     """Of a picture that is not refused."""
-    heights, refusal = heights_or_refusal(observation.images, model.calibration)
-    assert not refusal
-    return heights
+    reading = GelReader(model.calibration).read(observation.images)
+    assert not reading.refusal
+    return reading.height
 
 
 @pytest.fixture(scope="module")

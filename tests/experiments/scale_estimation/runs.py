@@ -58,12 +58,12 @@ def went_on(recording: Recording, progress: Quiet) -> bool:
     """Whether what was left of it is complete now."""
     run = RunFiles(recording)
     bench = loaded(IN_PROCESS_BENCH)(run.scene, run.station, run.context)
-    return perform_on(EXPERIMENT, bench, recording, progress).complete
+    return perform_on(EXPERIMENT, bench, run, progress).complete
 
 
 def answered(recording: Recording) -> dict[str, Any]:
     """Its result at the default levels."""
-    return EXPERIMENT.result(score(EXPERIMENT, recording, Accuracy.default(EXPERIMENT.knobs)))
+    return EXPERIMENT.result(score(EXPERIMENT, RunFiles(recording), Accuracy.default(EXPERIMENT.knobs)))
 
 
 def answering_of(recording: Recording) -> ScaleAnswering:

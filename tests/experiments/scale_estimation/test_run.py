@@ -246,7 +246,7 @@ def test_the_report_shows_each_sense_beside_the_model(touched: Recording, tmp_pa
         raise AssertionError("the experiment has a page of its own")
 
     accuracy = Accuracy.default(EXPERIMENT.knobs)
-    result = finish(EXPERIMENT, touched, accuracy, no_page, folder=tmp_path)
+    result = finish(EXPERIMENT, RunFiles(touched), accuracy, no_page, folder=tmp_path)
     page = Path(result["report"]).read_text()
     for title in ("What is believed of the size", "By sight", "By touch"):
         assert f"<h2>{title}</h2>" in page

@@ -114,7 +114,7 @@ def test_it_is_struck_where_the_gel_has_met_it(struck: Recording) -> None:
 @pytest.mark.slow  # a whole run with strikes; each sense has tests of its own
 def test_every_sense_answers_and_none_looks_at_the_drawing(struck: Recording, tmp_path: Path) -> None:
     accuracy = Accuracy.default(EXPERIMENT.knobs)
-    result = finish(EXPERIMENT, struck, accuracy, lambda *_: tmp_path, folder=tmp_path)
+    result = finish(EXPERIMENT, RunFiles(struck), accuracy, lambda *_: tmp_path, folder=tmp_path)
     assert not result["shape_known"]
     for sense in ("vision", "audio", "touch", "fused"):
         one = result["estimates"][sense]

@@ -51,12 +51,12 @@ def went_on(recording: Recording, progress: Quiet) -> bool:
     """Whether what was left of it is complete now."""
     run = RunFiles(recording)
     bench = loaded(IN_PROCESS_BENCH)(run.scene, run.station, run.context)
-    return perform_on(EXPERIMENT, bench, recording, progress).complete
+    return perform_on(EXPERIMENT, bench, run, progress).complete
 
 
 def answered(recording: Recording) -> dict[str, Any]:
     """Its result, by the quickest method, without what its seconds are."""
-    found: dict[str, Any] = timeless(EXPERIMENT.result(score(EXPERIMENT, recording, QUICKLY)))
+    found: dict[str, Any] = timeless(EXPERIMENT.result(score(EXPERIMENT, RunFiles(recording), QUICKLY)))
     return found
 
 

@@ -165,7 +165,7 @@ def test_the_report_and_the_surfaces_are_beside_the_result(touched: Recording, t
     def no_page(*_: Any) -> Path:
         raise AssertionError("the experiment has a page of its own")
 
-    result = finish(EXPERIMENT, touched, QUICKLY, no_page, folder=tmp_path)
+    result = finish(EXPERIMENT, RunFiles(touched), QUICKLY, no_page, folder=tmp_path)
     page = Path(result["report"]).read_text()
     for title in ("The surface", "Press by press", "Sections", "The silhouette"):
         assert f"<h2>{title}</h2>" in page

@@ -11,6 +11,7 @@ from harness.bench.station_file import Station, load_station, station_path
 from harness.experiment.begin import begin
 from harness.experiment.perform import IN_PROCESS, WIRES, describe_bench, perform_on_bench
 from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
 from tests.support.whole_run import touch_scene
 
@@ -39,16 +40,16 @@ def test_a_run_in_process_opens_no_wire_and_goes_on_without_one(
     assert recording.header.mock is not None
     assert recording.header.mock["bench"] == IN_PROCESS
     with pytest.raises(KeyboardInterrupt):
-        perform_on_bench(EXPERIMENT, recording, Stops())
+        perform_on_bench(EXPERIMENT, RunFiles(recording), Stops())
     assert recording.committed == 1
-    assert perform_on_bench(EXPERIMENT, Recording(tmp_path / "run"), Quiet()).complete
+    assert perform_on_bench(EXPERIMENT, RunFiles(Recording(tmp_path / "run")), Quiet()).complete
     assert recording.committed == 2
 
 
 def test_a_mocked_run_is_in_process_by_default(tmp_path: Path, station: Station, no_wires: None) -> None:
     recording = begin(EXPERIMENT, touch_scene(contacts=1), station, 3, None, tmp_path / "run").recording
     assert "in this process" in describe_bench(recording)
-    assert perform_on_bench(EXPERIMENT, recording, Quiet()).complete
+    assert perform_on_bench(EXPERIMENT, RunFiles(recording), Quiet()).complete
 
 
 def test_a_run_takes_the_wires_on_request(tmp_path: Path, station: Station, no_wires: None) -> None:
@@ -56,7 +57,7 @@ def test_a_run_takes_the_wires_on_request(tmp_path: Path, station: Station, no_w
     recording = begun.recording
     assert "at the far end of its cable" in describe_bench(recording)
     with pytest.raises(AssertionError, match="opens no wire"):
-        perform_on_bench(EXPERIMENT, recording, Quiet())
+        perform_on_bench(EXPERIMENT, RunFiles(recording), Quiet())
 
 
 @pytest.mark.parametrize(("gap", "bench"), [("none", None), (None, IN_PROCESS)])

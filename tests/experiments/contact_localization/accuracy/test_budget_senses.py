@@ -7,13 +7,13 @@ import pytest
 
 from experiments.contact_localization.accuracy.budget import Run
 from experiments.contact_localization.accuracy.dials import (
-    needs_images,
     needs_sound,
     setting_name,
 )
-from experiments.contact_localization.answer import Models, read, solve
+from experiments.contact_localization.answer import Models, solve
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.dials import SENSES, SPACING
+from experiments.contact_localization.posterior.dials import SENSES, SPACING, needs_images
+from experiments.contact_localization.posterior.policy import read
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import frame_facing, transform
 from harness.basics.materials import Material
@@ -24,6 +24,7 @@ from harness.experiment.budget import ask
 from harness.experiment.front import Front
 from harness.experiment.solving import Target
 from harness.recording.observation import Observation
+from harness.sim.optics.inverse import GelReader
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples import sounding_plate as plate
 
@@ -64,7 +65,8 @@ def observations() -> tuple[Observation, ...]:
 
 @pytest.fixture
 def run(observations: tuple[Observation, ...]) -> Run:
-    return Run(observations, Models(lambda _: MODEL), Prior(np.eye(3)), 0, "plate")
+    reader = GelReader(MODEL.calibration)
+    return Run(observations, reader, Models(lambda _: MODEL), Prior(np.eye(3)), 0, "plate")
 
 
 def front(audio_seconds: float, touch_seconds: float, audio_error: float = 2e-3) -> Front:
@@ -82,7 +84,7 @@ def front(audio_seconds: float, touch_seconds: float, audio_error: float = 2e-3)
 
 
 def test_a_budget_that_only_sound_keeps_reads_no_image(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("experiments.contact_localization.answer.heights_or_refusal", never)
+    monkeypatch.setattr(GelReader, "read", never)
     found = ask(run, front(0.01, 1e4), Target(seconds=60.0))
     assert found.point.levels == AUDIO
     assert found.kept
@@ -90,7 +92,7 @@ def test_a_budget_that_only_sound_keeps_reads_no_image(run: Run, monkeypatch: py
 
 
 def test_an_error_that_sound_promises_first_reads_no_image(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("experiments.contact_localization.answer.heights_or_refusal", never)
+    monkeypatch.setattr(GelReader, "read", never)
     found = ask(run, front(0.01, 1e4), Target(error=5e-3))
     assert found.tried == (setting_name(AUDIO),)
     assert found.kept
@@ -114,8 +116,8 @@ def test_settings_that_need_sound_are_left_out_where_nothing_was_heard(run: Run)
 
 
 def test_sound_is_answered_the_same_whether_images_were_read_or_not(run: Run) -> None:
-    given = run.observations, MODEL, run.prior, 0
-    with_images, without = solve(read(*given), AUDIO), solve(read(*given, images=False), AUDIO)
+    without = solve(run.read(AUDIO), AUDIO)
+    with_images = solve(read(run.observations, run.reader, MODEL, run.prior, 0), AUDIO)
     assert with_images.found is not None
     assert without.found is not None
     np.testing.assert_array_equal(with_images.found.position_in_object, without.found.position_in_object)

@@ -11,11 +11,11 @@ import pytest
 from experiments.contact_localization.accuracy import table
 from experiments.contact_localization.accuracy.benchmark_runs import Cell, cells, scene_of
 from experiments.contact_localization.accuracy.table import MEASUREMENT, METHODS
-from experiments.contact_localization.answer import read
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.baselines import mean_random_error
 from experiments.contact_localization.posterior.dials import SPACING
+from experiments.contact_localization.posterior.policy import read
 from harness.basics.errors import WrongUse
 from harness.basics.symmetry import find_symmetries
 from harness.bench.scene import scene_from_options
@@ -23,6 +23,7 @@ from harness.experiment.subjects import objects
 from harness.experiment.tables import TableRow, measure
 from harness.experiment.tables import rows as rows_of
 from harness.recording.observation import Observation
+from harness.sim.optics.inverse import GelReader
 
 Results = dict[Cell, Mapping[str, Any]]
 
@@ -139,7 +140,10 @@ def test_a_refused_fit_of_the_right_object_is_a_failure_at_the_value_of_a_guess(
     true = np.array([0.02, -0.0075, 0.025])
     symmetry = find_symmetries(block.mesh)
     answered = table._estimated(
-        read(observations, block, prior, seed=0), {SPACING.name: 3e-3}, true, symmetry
+        read(observations, GelReader(block.calibration), block, prior, seed=0),
+        {SPACING.name: 3e-3},
+        true,
+        symmetry,
     )
     assert answered["error_m"] == answered["error_symmetric_m"] == mean_random_error(block.mesh, true)
     assert answered["in_region90"] is False

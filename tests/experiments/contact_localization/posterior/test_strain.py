@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization import answer
-from experiments.contact_localization.answer import Readings, located
 from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.posterior import policy
 from experiments.contact_localization.posterior.estimate import (
     MOST,
     STRAINED,
@@ -19,6 +18,7 @@ from experiments.contact_localization.posterior.estimate import (
 )
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
 from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.policy import Readings, estimate_contacts
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.errors import FitRefused
@@ -76,8 +76,8 @@ def test_a_strained_answer_is_made_again_under_errors_so_much_larger(
         asked.append((errors.tilt / USUAL.tilt, readings.prior.yaw_sigma / prior.yaw_sigma))
         return (replace(plain, strain=strain),)
 
-    monkeypatch.setattr(answer, "_located_at", at)
-    found = located(Readings((), (), block, prior, 0, (0.0, 0.0)), QUICK)[-1]
+    monkeypatch.setattr(policy, "_estimate_under", at)
+    found = estimate_contacts(Readings((), (), block, prior, 0), QUICK)[-1]
     expected = [(1.0, 1.0)] if times == 1.0 else [(1.0, 1.0), (times, times)]
     assert np.allclose(asked, expected)
     assert any("[errors]" in doubt for doubt in found.doubts) == (times > 1.0)
@@ -94,9 +94,9 @@ def test_what_fits_no_place_at_other_levels_is_looked_at_again_at_the_default_on
             raise FitRefused("no place on this object explains the contacts")
         return (plain,)
 
-    monkeypatch.setattr(answer, "_located_at", at)
-    readings = Readings((), (), block, prior, 0, (0.0, 0.0))
-    again, once = located(readings, QUICK)[-1], located(readings, usual)[-1]
+    monkeypatch.setattr(policy, "_estimate_under", at)
+    readings = Readings((), (), block, prior, 0)
+    again, once = estimate_contacts(readings, QUICK)[-1], estimate_contacts(readings, usual)[-1]
     assert np.array_equal(again.position_in_object, once.position_in_object)
     assert any("default levels" in doubt for doubt in again.doubts)
     assert not once.doubts
@@ -112,8 +112,8 @@ def test_what_fits_no_place_at_the_default_levels_is_refused_at_all(
         asked.append(accuracy)
         raise FitRefused("no place on this object explains the contacts")
 
-    monkeypatch.setattr(answer, "_located_at", at)
+    monkeypatch.setattr(policy, "_estimate_under", at)
     for accuracy in (QUICK, dials()):
         with pytest.raises(FitRefused):
-            located(Readings((), (), block, prior, 0, (0.0, 0.0)), accuracy)
+            estimate_contacts(Readings((), (), block, prior, 0), accuracy)
     assert len(asked) == 3

@@ -16,6 +16,7 @@ from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.policy import Readings
 from experiments.contact_localization.report.result import estimate_of, flags_of
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.errors import RecordingDamaged
@@ -28,6 +29,7 @@ from harness.experiment.truth import Truth, read_truth
 from harness.recording.observation import Observation
 from harness.recording.recording import Recording
 from harness.recording.truth_file import write_truth_file
+from harness.sim.optics.inverse import GelReading
 from tests.samples.synthetic_press import PRESSES
 from tests.support.localization import chosen, dials
 
@@ -44,8 +46,9 @@ def answered(contacts: tuple[Contact, ...], block: Model, prior: Prior) -> Answe
     last: Estimate = locate(contacts, block, prior, QUICK, Noise())[-1]
     image = np.zeros((1, 120, 160, 3), np.uint8)
     observations = tuple(Observation(c.base_from_gel, image) for c in contacts)
-    heights = tuple(np.zeros((120, 160)) for _ in contacts)
-    return Answer(observations, heights, block, prior, last, 0.1)
+    flat = np.zeros((120, 160))
+    gels = tuple(GelReading(flat, flat, "", (0.0, 0.0)) for _ in contacts)
+    return Answer(Readings(observations, gels, block, prior, 0), last, 0.1)
 
 
 @pytest.fixture(scope="module")

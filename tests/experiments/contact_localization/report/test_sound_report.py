@@ -15,6 +15,7 @@ from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import locate
 from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.policy import Readings
 from experiments.contact_localization.report.sound_report import contact_time, sound_of, strike_line
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.errors import FitRefused
@@ -65,11 +66,9 @@ def scored(model: Model, strikes: tuple[Strike | None, ...], asked: bool = True)
         Noise(),
         strikes=STRIKES,
     )[-1]
+    seen = tuple(Observation(pose, IMAGE, strike) for pose, strike in zip(poses, strikes, strict=True))
     found = Answer(
-        tuple(Observation(pose, IMAGE, strike) for pose, strike in zip(poses, strikes, strict=True)),
-        tuple(np.zeros((1, 1)) for _ in poses),
-        model,
-        prior,
+        Readings(seen, (), model, prior, 0),
         last,
         0.1,
         "audio",
