@@ -6,7 +6,7 @@ from experiments.contact_localization.accuracy.budget import BUDGETS
 from experiments.contact_localization.accuracy.dials import KNOBS
 from experiments.contact_localization.accuracy.table import MEASUREMENT
 from experiments.contact_localization.answer import PROGRAM, ContactAnswering
-from experiments.contact_localization.next_contact import ChosenContacts
+from experiments.contact_localization.next_contact import ContactChooser
 from experiments.contact_localization.plan import plan
 from experiments.contact_localization.report.report import GIVES, sources, write
 from experiments.contact_localization.report.result import answer_lines, result_of
@@ -15,6 +15,7 @@ from harness.bench.station import Bench
 from harness.experiment.experiment import Experiment, Helpers
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import StepPerformer
+from harness.skills.exploring.exploration import Exploration
 from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between
 
@@ -23,9 +24,11 @@ PLAN_KEY = "contacts"
 
 def _performer(run: RunFiles, helpers: Helpers) -> StepPerformer[Bench]:
     press = PressPerformer(partial(way_between, helpers.twin), ask=helpers.ask, plan_key=PLAN_KEY)
-    if run.scene.section(Localization).choose == "planned":
-        return press
-    return ChosenContacts(run, helpers.twin, press, helpers.say)
+    chooser = None
+    if run.scene.section(Localization).choose == "active":
+        chooser = ContactChooser(run, helpers.twin, helpers.say)
+    enough = "the contact's place is known as well as was asked"
+    return Exploration(chooser, press, helpers.ask, helpers.say, enough, patience=0)
 
 
 EXPERIMENT = Experiment(

@@ -1,6 +1,6 @@
 """The contacts of a localization chosen one by one: each where it should tell most of where the object is."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -18,16 +18,13 @@ from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import FitRefused, MotionRefused, WrongUse
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import apply, inverse
-from harness.bench.reading import Reading
-from harness.bench.station import Bench
 from harness.experiment.levels import chosen_levels
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.recording.step_file import Step
 from harness.skills.exploring.bayes_risk import bayes_risk_after
 from harness.skills.exploring.surroundings import end_of
 from harness.skills.planning import Itinerary
-from harness.skills.press import ContactMotion, PressPerformer
+from harness.skills.press import ContactMotion
 from harness.skills.sites import PressLimits, Site, candidate_sites
 from harness.skills.strike import planner
 from harness.twin.bench import TwinBench
@@ -53,22 +50,20 @@ PLACEHOLDER: Mapping[str, Any] = {"choose": "active"}
 """What ``run.json`` keeps of a contact that is planned once those before it are read."""
 
 
-class ChosenContacts:
-    """Performs contacts of which all but the first are planned between them.
+class ContactChooser:
+    """Chooses the contacts of a run after the first.
 
     Args:
-        run: the folder.
-        bench: the twin, with the object where it should be.
-        press: makes each contact.
-        say: tells where a contact goes, and why no more are made.
+        run: folder of the run.
+        bench: twin of the bench, with the object at its nominal pose.
+        say: reports the error that is expected after each contact.
     """
 
-    def __init__(
-        self, run: RunFiles, bench: TwinBench, press: PressPerformer, say: Callable[[str], None]
-    ) -> None:
-        self._run, self._bench, self._press, self._say = run, bench, press, say
+    def __init__(self, run: RunFiles, bench: TwinBench, say: Callable[[str], None]) -> None:
+        self._run, self._bench, self._say = run, bench, say
         self._asked = run.scene.section(Localization)
         self._before: list[Mapping[str, Any]] = []
+        self._estimated: Estimate | None = None
 
     @cached_property
     def _strikes(self) -> StrikePlanner | None:
@@ -82,48 +77,35 @@ class ChosenContacts:
     def _rays(self) -> RayMesh:
         return RayMesh(self._answering.model.mesh)
 
-    def steps(self, recording: Recording) -> Iterator[Step]:
-        """The contacts that are not yet on the disk; each is planned, and rehearsed, when it is asked for."""
-        planned = recording.planned(self._press.plan_key)
-        for index in range(recording.committed, len(planned)):
-            if index == 0:
-                yield Step(index, "press", planned[index])
-                continue
-            estimate = self._estimate(recording, index)
-            if self._is_sure(estimate):
-                self._say("the contact's place is known as well as was asked; no more contacts are made")
-                return
-            try:
-                yield Step(index, "press", self._next(recording, index, estimate))
-            except WrongUse as refusal:
-                self._say(f"no more contacts are made than {index}: {refusal}")
-                return
-
-    def perform(self, step: Step, bench: Bench) -> Sequence[Reading]:
-        """One contact."""
-        return self._press.perform(step, bench)
-
-    def _is_sure(self, estimate: Estimate | None) -> bool:
+    def is_sure(self, recording: Recording, index: int) -> bool:
+        """Whether the contacts before ``index`` determine the place as well as the scene asks."""
         until = self._asked.until
-        return until is not None and estimate is not None and estimate.credible90 <= until
+        if until is None or index == 0:
+            return False
+        estimate = self._estimate(recording, index)
+        return estimate is not None and estimate.credible90 <= until
 
     def _estimate(self, recording: Recording, index: int) -> Estimate | None:
-        """By the contacts before one; None where they say nothing yet."""
+        """Estimate from the contacts before ``index``; None if they determine nothing yet."""
+        if len(self._before) == index:
+            return self._estimated
         for k in range(len(self._before), index):
             record = recording.step(k)
             self._answering.read(record)
             self._before.append(record.step.parameters)
         try:
-            return self._answering.so_far()
+            self._estimated = self._answering.so_far()
         except (FitRefused, WrongUse):
-            return None
+            self._estimated = None
+        return self._estimated
 
-    def _next(self, recording: Recording, index: int, estimate: Estimate | None) -> dict[str, Any]:
-        """The parameters of the most telling contact that the arm can make.
+    def plan(self, recording: Recording, index: int) -> dict[str, Any]:
+        """Return the parameters of the most informative contact that the arm can make.
 
         Raises:
-            WrongUse: none of many places drawn can be touched on a free way.
+            WrongUse: none of the places sampled can be touched on a collision-free path.
         """
+        estimate = self._estimate(recording, index)
         touched = np.array([self._touched(parameters) for parameters in self._before])
         sites = self._candidates(touched, (recording.header.seed, index))
         left = self._errors_left(sites, estimate)

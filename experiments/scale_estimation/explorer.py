@@ -40,7 +40,7 @@ from harness.picture.outline import SeenOutline
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import Step, StepRecord
-from harness.skills.exploring.exploration import SKIPPED, Exploration, kinds
+from harness.skills.exploring.exploration import Exploration, kinds, press_into_unknown
 from harness.skills.exploring.lines import LineTarget, contact_along, lines_to, unlike_first
 from harness.skills.exploring.surroundings import Surroundings, end_of
 from harness.skills.exploring.unknown_space import (
@@ -106,8 +106,8 @@ def performer(run: RunFiles, helpers: Helpers) -> Exploration:
         helpers: what a step may use beside the bench.
     """
     explorer = Explorer(run)
-    enough = "the size is known as well as was asked"
-    return Exploration(explorer, helpers.ask, helpers.say, enough, explorer.strike)
+    press = press_into_unknown(explorer.way, helpers.ask, explorer.strike)
+    return Exploration(explorer, press, helpers.ask, helpers.say, "the size is known as well as was asked")
 
 
 LARGEST = 0.999
@@ -135,7 +135,6 @@ class Explorer:
         self._struck = 0
         self._contacts = 0
         self._followed: list[FloatArray] = []
-        self._skipped = 0
         self._travels: TwinBench | None = None
         self._nothing: TwinBench | None = None
         self._seen: tuple[SeenStand, ...] = ()
@@ -154,11 +153,6 @@ class Explorer:
         self._take_in(recording, index)
         low, high = self._answering.answer().fused.interval
         return bool(0.5 * (high - low) <= until)
-
-    def skipped(self, recording: Recording, index: int) -> int:
-        """How many steps right before one were not made."""
-        self._take_in(recording, index)
-        return self._skipped
 
     def plan(self, recording: Recording, index: int) -> dict[str, Any]:
         """The parameters of a contact.
@@ -221,7 +215,6 @@ class Explorer:
 
     def _take_in_step(self, record: StepRecord) -> None:
         self._answering.read(record)
-        self._skipped = self._skipped + 1 if record.step.kind == SKIPPED else 0
         if record.step.kind != "press":
             return
         self._contacts += 1

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.methods import METHOD, estimated
+from experiments.shape_reconstruction.methods import METHOD, estimated, load_kernels
 from experiments.shape_reconstruction.readings import ShapeReadings
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, WrongUse
@@ -44,6 +44,8 @@ class ShapeAnswering:
 
     def __post_init__(self) -> None:
         self.readings = ShapeReadings(self.run)
+        _ = self.run.gel_reader
+        load_kernels(str(self.accuracy[METHOD.name]))
         self._read = {"vision": 0.0, "touch": 0.0}
 
     def read(self, record: StepRecord) -> None:

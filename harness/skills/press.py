@@ -47,7 +47,10 @@ SETTLE = 0.3
 After = Callable[[Step, Sequence[Reading]], StrikeMotion | None]
 """Plans a strike on what a contact has just read; None where none is to be made, or none is free."""
 
-_ARRAYS = ("start_rad", "travel_rad", "base_from_stand_off", "axis_in_base")
+STAND_OFF = "base_from_stand_off"
+"""Key that the parameters of every planned contact have."""
+
+_ARRAYS = ("start_rad", "travel_rad", STAND_OFF, "axis_in_base")
 
 AVERAGED = 0.02
 """s over which the force is averaged: the noise of ten packets at 500 Hz, and 0.2 mm of the way."""
@@ -92,7 +95,7 @@ class ContactMotion:
         parameters: dict[str, Any] = {
             "start_rad": self.start.tolist(),
             "travel_rad": self.travel.tolist(),
-            "base_from_stand_off": self.base_from_stand_off.tolist(),
+            STAND_OFF: self.base_from_stand_off.tolist(),
             "axis_in_base": self.axis.tolist(),
             "search_m": self.search,
             "press_m": self.press,
@@ -106,7 +109,7 @@ class ContactMotion:
         return cls(
             arrays["start_rad"],
             arrays["travel_rad"].reshape(-1, 6),
-            arrays["base_from_stand_off"],
+            arrays[STAND_OFF],
             arrays["axis_in_base"],
             float(parameters["search_m"]),
             float(parameters["press_m"]),

@@ -22,7 +22,7 @@ from harness.picture.camera_errors import CameraErrors
 from harness.picture.outline import SeenOutline, read_outline
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.skills.exploring.exploration import SKIPPED, Exploration, NextContact, kinds
+from harness.skills.exploring.exploration import Exploration, kinds, press_into_unknown
 from harness.skills.exploring.lines import LINES, contact_along, lines_to
 from harness.skills.exploring.surroundings import Surroundings, end_of, nowhere
 from harness.skills.exploring.unknown_space import (
@@ -103,11 +103,10 @@ def performer(run: RunFiles, helpers: Helpers) -> Exploration:
         helpers: what a step may use beside the bench.
     """
     choose, enough = run.scene.section(ShapeRun).choose, "the shape is known as well as was asked"
-    planned = choose == "planned"
-    explorer: NextContact = (
-        DrawnContacts(helpers.twin) if planned else ShapeExplorer(run, live_method(choose))
-    )
-    return Exploration(explorer, helpers.ask, helpers.say, enough)
+    explorer = None if choose == "planned" else ShapeExplorer(run, live_method(choose))
+    way = partial(way_between, helpers.twin) if explorer is None else explorer.way
+    press = press_into_unknown(way, helpers.ask)
+    return Exploration(explorer, press, helpers.ask, helpers.say, enough)
 
 
 DRAWN = 160
@@ -115,29 +114,6 @@ DRAWN = 160
 
 UP_TO = 0.06
 """M above the support, up to which lines end where nothing was seen."""
-
-
-class DrawnContacts:
-    """Contacts that were planned on the drawing before anything moved.
-
-    Args:
-        twin: of the bench, the object as it is drawn.
-    """
-
-    def __init__(self, twin: TwinBench) -> None:
-        self.way = partial(way_between, twin)
-
-    def is_sure(self, _recording: Recording, _index: int) -> bool:
-        """All are made."""
-        return False
-
-    def skipped(self, _recording: Recording, _index: int) -> int:
-        """None is left out."""
-        return 0
-
-    def plan(self, _recording: Recording, _index: int) -> dict[str, Any]:
-        """Nothing is added to what was planned."""
-        return {}
 
 
 class ShapeExplorer:
@@ -152,7 +128,7 @@ class ShapeExplorer:
         self._run, self._shape = run, RunningShape(method)
         self._settings = run.scene.section(ShapeRun)
         self._readings = ShapeReadings(run)
-        self._read, self._skipped = 0, 0
+        self._read = 0
         self._joints: FloatArray = HOME
 
     @cached_property
@@ -213,11 +189,6 @@ class ShapeExplorer:
         found = self._shape.after(self._readings.evidence())
         return found is not None and not found.not_bounded and bool(found.deviation.mean() <= until)
 
-    def skipped(self, recording: Recording, index: int) -> int:
-        """How many steps right before one were not made."""
-        self._take_in(recording, index)
-        return self._skipped
-
     def plan(self, recording: Recording, index: int) -> dict[str, Any]:
         """The parameters of a press along the best of some lines that has a free way.
 
@@ -244,7 +215,6 @@ class ShapeExplorer:
         for k in range(self._read, index):
             record = recording.step(k)
             self._readings.read(record)
-            self._skipped = self._skipped + 1 if record.step.kind == SKIPPED else 0
             if record.step.kind == "press":
                 self._joints = end_of(record.step.parameters)
         self._read = index

@@ -1,18 +1,18 @@
-"""The steps of an exploration: a look, then contacts planned one by one on what is known by then."""
+"""Perform the steps of a run whose contacts are chosen one at a time from what was read before."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
-from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.bench.device import CAMERA
 from harness.bench.reading import Reading
 from harness.bench.station import BARE, LOOK, Bench
+from harness.bench.travel import Trajectory
 from harness.recording.observation import BARE_IMAGE, IMAGE
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step
-from harness.skills.press import After, PressPerformer, Speeds
+from harness.skills.press import STAND_OFF, After, PressPerformer, Speeds
 from harness.skills.strike import Ask
 
 PLAN_KEY = "steps"
@@ -34,22 +34,16 @@ _PATIENCE = 5.0
 
 
 class NextContact(Protocol):
-    """Plans the contacts of a run one at a time, on what the steps before have read."""
-
-    def way(self, here: FloatArray, planned: FloatArray) -> FloatArray:
-        """``(n, 6)`` rad: around all that the object may take, from where the arm is to a travel's end."""
+    """Chooses the contacts of a run one at a time, from the readings of the steps before."""
 
     def is_sure(self, recording: Recording, index: int) -> bool:
-        """Whether the steps before one tell as much as the scene asks."""
-
-    def skipped(self, recording: Recording, index: int) -> int:
-        """How many steps right before one were not made."""
+        """Whether the steps before ``index`` determine the answer as well as the scene asks."""
 
     def plan(self, recording: Recording, index: int) -> dict[str, Any]:
-        """The parameters of a contact.
+        """Return the parameters of the contact that is step ``index``.
 
         Raises:
-            WrongUse: no free way was found to any place; nothing was moved.
+            WrongUse: no place has a collision-free path; nothing was moved.
         """
 
 
@@ -58,52 +52,77 @@ def kinds(looks: bool, contacts: int) -> list[dict[str, Any]]:
     return [{"kind": kind} for kind in ["look"] * looks + ["contact"] * contacts]
 
 
-class Exploration:
-    """Looks, then presses, and strikes where that is asked, where the object must be by what is known so far.
+def press_into_unknown(way: Trajectory, ask: Ask | None, after: After | None = None) -> PressPerformer:
+    """Create the performer of presses into the space of an object whose pose or shape is unknown.
 
     Args:
-        explorer: plans the contacts.
-        ask: shows a person what to do; None where nobody is there.
-        say: tells how it goes.
-        enough: what is said where the explorer is sure.
+        way: plans a path around the space that the object may take.
+        ask: shows the operator what to do; None without an operator.
         after: plans a strike where a contact met the object; None for no such strikes.
+    """
+    return PressPerformer(way, SPEEDS, ask=ask, plan_key=PLAN_KEY, explores=True, after=after)
+
+
+class Exploration:
+    """Performs looks, presses and strikes; contacts without planned parameters are chosen one at a time.
+
+    Args:
+        chooser: chooses the contacts; None if all are planned.
+        press: performs each contact.
+        ask: shows the operator what to do; None without an operator.
+        say: reports the progress.
+        enough: reported when the chooser is sure.
+        patience: contacts in a row without a collision-free path, each left out as a step of its own, after
+            which no more are made.
     """
 
     def __init__(
         self,
-        explorer: NextContact,
+        chooser: NextContact | None,
+        press: PressPerformer,
         ask: Ask | None,
         say: Callable[[str], None],
         enough: str,
-        after: After | None = None,
+        patience: int = MOST_SKIPPED,
     ) -> None:
-        self._explorer, self._ask, self._say, self._enough = explorer, ask, say, enough
-        self._press = PressPerformer(
-            explorer.way, SPEEDS, ask=ask, plan_key=PLAN_KEY, explores=True, after=after
-        )
+        self._chooser, self._press, self._ask, self._say = chooser, press, ask, say
+        self._enough, self._patience = enough, patience
 
     def steps(self, recording: Recording) -> Iterator[Step]:
-        """Those that are not on the disk; each contact is planned on what was read before it."""
-        planned = recording.planned(PLAN_KEY)
+        """Yield the steps that are not on the disk; each contact is chosen from what was read before it."""
+        planned = recording.planned(self._press.plan_key)
+        skipped = self._skipped_last(recording)
         for index in range(recording.committed, len(planned)):
-            if self._explorer.is_sure(recording, index):
+            if self._chooser is not None and self._chooser.is_sure(recording, index):
                 self._say(f"{self._enough}; no more contacts are made")
                 return
-            if planned[index]["kind"] == "look":
+            if planned[index].get("kind") == "look":
                 yield Step(index, "look", planned[index])
                 continue
-            if self._explorer.skipped(recording, index) >= MOST_SKIPPED:
-                self._say(f"{MOST_SKIPPED} contacts in a row had no free way; no more are made")
+            if self._chooser is None or STAND_OFF in planned[index]:
+                yield Step(index, "press", planned[index])
+                continue
+            if skipped and skipped >= self._patience:
+                self._say(f"{skipped} contacts in a row had no free way; no more are made")
                 return
-            yield self._contact(recording, planned[index], index)
+            kind = {key: value for key, value in planned[index].items() if key == "kind"}
+            try:
+                step = Step(index, "press", {**kind, **self._chooser.plan(recording, index)})
+            except WrongUse as refusal:
+                if self._patience == 0:
+                    self._say(f"no more contacts are made than {index}: {refusal}")
+                    return
+                self._say(f"contact {index + 1} is left out: {refusal}")
+                step = Step(index, SKIPPED, {**planned[index], "why": str(refusal)})
+            skipped = skipped + 1 if step.kind == SKIPPED else 0
+            yield step
 
-    def _contact(self, recording: Recording, planned: Mapping[str, Any], index: int) -> Step:
-        """The next contact; a step without readings where none has a free way: the run goes on without it."""
-        try:
-            return Step(index, "press", {**planned, **self._explorer.plan(recording, index)})
-        except WrongUse as refusal:
-            self._say(f"contact {index + 1} is left out: {refusal}")
-            return Step(index, SKIPPED, {**planned, "why": str(refusal)})
+    def _skipped_last(self, recording: Recording) -> int:
+        """Return how many steps at the end of a recording were left out."""
+        for count in range(recording.committed):
+            if recording.step(recording.committed - 1 - count).step.kind != SKIPPED:
+                return count
+        return recording.committed
 
     def perform(self, step: Step, bench: Bench) -> Sequence[Reading]:
         """A look, a contact, or nothing where none had a free way."""

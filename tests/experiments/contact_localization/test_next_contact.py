@@ -1,7 +1,7 @@
 """Contacts of a localization chosen one by one: within the limits asked for, and the same when resumed."""
 
 import shutil
-from functools import partial
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,19 +10,21 @@ import pytest
 from experiments.contact_localization import next_contact
 from experiments.contact_localization.accuracy.benchmark_runs import Cell
 from experiments.contact_localization.experiment import EXPERIMENT, PLAN_KEY
-from experiments.contact_localization.next_contact import EXPECTED, PLACEHOLDER, ChosenContacts
+from experiments.contact_localization.next_contact import EXPECTED, PLACEHOLDER
 from experiments.contact_localization.section import Localization
 from harness.basics.errors import MotionRefused, WrongUse
 from harness.bench.scene import SceneFile, Sensors, scene_from_options
 from harness.bench.station_file import load_station, station_path
 from harness.experiment.begin import begin
+from harness.experiment.experiment import Helpers
 from harness.experiment.in_process import performed
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
+from harness.recording.step_file import Step
 from harness.skills.planning import Itinerary, RunPlan
-from harness.skills.press import ContactMotion, PressPerformer
+from harness.skills.press import ContactMotion
 from harness.skills.sites import Site
-from harness.twin.bench_of import twin_of, way_between
+from harness.twin.bench_of import twin_of
 
 STATION = load_station(station_path("mock"))
 CELL = Cell("mug", "close", "default", "known", 71, choose="active")
@@ -41,9 +43,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> RunFiles:
     return RunFiles(performed(EXPERIMENT, CELL, scene(), STATION, folder))
 
 
-def contacts_of(run: RunFiles, said: list[str]) -> ChosenContacts:
-    twin = twin_of(run.scene, run.station, run.mesh)
-    return ChosenContacts(run, twin, PressPerformer(partial(way_between, twin)), said.append)
+def chosen(run: RunFiles, said: list[str]) -> Iterator[Step]:
+    """The steps that are left of a run."""
+    helpers = Helpers(twin_of(run.scene, run.station, run.mesh), say=said.append)
+    return EXPERIMENT.performer(run, helpers).steps(run.recording)
 
 
 def after(run: RunFiles, count: int, folder: Path) -> RunFiles:
@@ -80,7 +83,7 @@ def test_every_contact_keeps_the_limits_and_says_what_error_it_should_leave(run:
 
 def test_a_run_that_is_resumed_goes_where_it_would_have_gone(run: RunFiles, tmp_path: Path) -> None:
     ended, said = after(run, 2, tmp_path / "run"), list[str]()
-    step = next(contacts_of(ended, said).steps(ended.recording))
+    step = next(chosen(ended, said))
     assert step.index == 2
     assert step.parameters == run.recording.step(2).step.parameters
     (sentence,) = said
@@ -100,7 +103,7 @@ def test_the_place_that_should_leave_least_error_is_taken(
 
     monkeypatch.setattr(f"{next_contact.__name__}.errors_left", noted)
     ended = after(run, 1, tmp_path / "run")
-    step = next(contacts_of(ended, []).steps(ended.recording))
+    step = next(chosen(ended, []))
     (errors,) = left
     assert len(errors) == next_contact.CANDIDATES
     assert errors.min() < np.median(errors) < errors.max()
@@ -113,9 +116,9 @@ def test_no_more_are_made_once_the_place_is_known_as_well_as_was_asked(
     run: RunFiles, tmp_path: Path, until: float, more: bool
 ) -> None:
     ended, said = after(run, 2, tmp_path / "run"), list[str]()
-    contacts = contacts_of(ended, said)
-    contacts._asked = contacts._asked.model_copy(update={"until": until})
-    steps = list(contacts.steps(ended.recording)) if not more else [next(contacts.steps(ended.recording))]
+    asked = ended.scene.section(Localization).model_copy(update={"until": until})
+    vars(ended)["scene"] = ended.scene.with_section(asked)
+    steps = list(chosen(ended, said)) if not more else [next(chosen(ended, said))]
     assert bool(steps) is more
     assert any("known as well as was asked" in sentence for sentence in said) is not more
 
@@ -125,7 +128,7 @@ def test_a_contact_that_nowhere_has_a_free_way_ends_the_run_and_says_so(
 ) -> None:
     monkeypatch.setattr(Itinerary, "visit", lambda *_, **__: False)
     ended, said = after(run, 1, tmp_path / "run"), list[str]()
-    assert list(contacts_of(ended, said).steps(ended.recording)) == []
+    assert list(chosen(ended, said)) == []
     (sentence,) = said
     assert " 1: " in sentence
 
@@ -144,7 +147,7 @@ def test_a_place_whose_rehearsal_is_refused_is_passed_over(
 
     ended = after(run, 2, tmp_path / "run")
     monkeypatch.setattr(Itinerary, "rehearsed", once)
-    step = next(contacts_of(ended, []).steps(ended.recording))
+    step = next(chosen(ended, []))
     assert refused
     assert step.parameters != run.recording.step(2).step.parameters
 
