@@ -1,0 +1,146 @@
+"""Session, explorer, answer, comparison and report read each step once and solve each answer once."""
+
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.contact_localization.posterior import policy
+from experiments.scale_estimation.answer import ScaleAnswering
+from experiments.shape_reconstruction import answer as shape_answer
+from experiments.shape_reconstruction.methods import QUICK
+from harness.bench.scene import SceneFile, scene_from_json
+from harness.bench.station_file import Station
+from harness.effects.accuracy import Accuracy, Setting
+from harness.experiment.answer import WrittenAnswer, add_report, write_answer
+from harness.experiment.begin import begin
+from harness.experiment.lookup import named
+from harness.experiment.perform import Performed, perform_on_bench
+from harness.recording import run_folder
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from harness.recording.session import Quiet
+from harness.report.run_page import write_run_page
+from harness.sim.optics import inverse
+
+SENSES: Mapping[str, Any] = {"touch": True, "camera": False, "sound": False}
+SCENES: Mapping[str, Mapping[str, Any]] = {
+    "contact-localization": {"localization": {"contacts": 3, "choose": "active"}, "sensors": SENSES},
+    "scale-estimation": {
+        "object": {"mesh": "builtin:mug", "scale": "hidden"},
+        "scale": {"contacts": 3},
+        "sensors": {**SENSES, "camera": True},
+    },
+    "shape-reconstruction": {
+        "shape": {"presses": 3, "choose": "farthest"},
+        "sensors": {**SENSES, "camera": True},
+    },
+}
+LEVELS: Mapping[str, Setting] = {"shape-reconstruction": {"shape.method": QUICK}}
+
+
+@dataclass
+class Calls:
+    """What was inverted and solved, and how often."""
+
+    pictures: Counter[bytes] = field(default_factory=Counter)
+    masks: int = 0
+    answers: Counter[object] = field(default_factory=Counter)
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
+    found = Calls()
+
+    def counted(module: object, name: str, count: Callable[..., None]) -> None:
+        inner = vars(module)[name]
+
+        def outer(*arguments: Any, **named: Any) -> Any:
+            count(*arguments, **named)
+            return inner(*arguments, **named)
+
+        monkeypatch.setattr(module, name, outer)
+
+    def mask(*_: object) -> None:
+        found.masks += 1
+
+    def localization(
+        contacts: Any, _model: Any, _prior: Any, accuracy: Accuracy, *rest: Any, **_named: Any
+    ) -> None:
+        if rest[-1]:  # judged: an answer, and not an estimate between contacts
+            found.answers[len(contacts), str(accuracy["localization.senses"])] += 1
+
+    counted(inverse, "_invert_one", lambda image, *_: found.pictures.update([image.tobytes()]))
+    counted(run_folder, "mask_by_background", mask)
+    counted(policy, "locate", localization)
+    counted(ScaleAnswering, "answered", lambda *_: found.answers.update(["size"]))
+    counted(
+        shape_answer,
+        "estimated",
+        lambda _, seen: found.answers.update([(len(seen.touches), seen.look is None)]),
+    )
+    return found
+
+
+def scene_of(name: str) -> SceneFile:
+    return scene_from_json({"schema": 1, "object": {"mesh": "builtin:mug"}, **SCENES[name]}, "the test")
+
+
+def accuracy_of(name: str) -> Accuracy:
+    return Accuracy.default(named(name).knobs).with_(LEVELS.get(name, {}))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_each_picture_is_inverted_once_and_each_answer_is_solved_once(
+    name: str, station: Station, tmp_path: Path, calls: Calls
+) -> None:
+    experiment, accuracy, written = named(name), accuracy_of(name), list[WrittenAnswer]()
+    run = RunFiles(begin(experiment, scene_of(name), station, 3, None, tmp_path / "run").recording)
+
+    def conclude(done: Performed) -> None:
+        written.append(write_answer(experiment, run, accuracy, tmp_path, done.answering))
+
+    done = perform_on_bench(experiment, run, Quiet(), accuracy=accuracy, conclude=conclude)
+    result = add_report(experiment, written[0], partial(write_run_page, experiment), done.health, tmp_path)
+    assert Path(result["report"]).is_file()
+    records = run.recording.steps()
+    looks = [record for record in records if record.step.kind == "look"]
+    pressed = [record for record in records if "gel.image" in record.readings]
+    assert len(pressed) >= 2
+    recorded = {inverse.mean_picture(run.observe(record).images).tobytes() for record in pressed}
+    # Other pictures are those that load the kernels.
+    assert Counter({picture: calls.pictures[picture] for picture in recorded}) == Counter(recorded)
+    assert calls.masks == len(looks)
+    assert calls.answers
+    assert set(calls.answers.values()) == {1}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_no_kernel_is_loaded_between_the_first_step_and_the_answer(
+    name: str, station: Station, tmp_path: Path
+) -> None:
+    experiment = named(name)
+    run = RunFiles(begin(experiment, scene_of(name), station, 3, None, tmp_path / "run").recording)
+    perform_on_bench(experiment, run, Quiet())
+    script = f"from {__name__} import answer_recording; answer_recording({name!r}, {str(tmp_path / 'run')!r})"
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def answer_recording(name: str, folder: str) -> None:
+    """Answer a recording in a process of its own; fail if that compiles or loads a kernel."""
+    from numba.core.event import install_recorder
+
+    run = RunFiles(Recording(Path(folder)))
+    answering = named(name).answering(run, accuracy_of(name))
+    records = run.recording.steps()
+    with install_recorder("numba:compiler_lock") as loads:
+        for record in records:
+            answering.read(record)
+        answering.answer()
+    assert not loads.buffer, f"{len(loads.buffer)} kernels were loaded"
