@@ -27,7 +27,7 @@ from experiments.contact_localization.posterior.policy import Readings, estimate
 from experiments.contact_localization.section import Localization
 from experiments.contact_localization.touch.touch import contact_of
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import FitRefused, MeshRefused, WrongUse
+from harness.basics.errors import DataRefused, FitRefused, MeshRefused, WrongUse
 from harness.basics.geometry import frame_facing, transform
 from harness.basics.symmetry import SymmetryGroup, find_symmetries
 from harness.bench.acquisition import Strike
@@ -107,7 +107,7 @@ def load_kernels(model: Model, setting: Setting) -> None:
     contacts = [contact_of(pose, bump, sensor.pitch, accuracy.of(BLOCK), noise.touch) for pose in poses]
     strikes = () if model.modes is None else synthetic_strikes(model.modes, surface.points[chosen])
     for judged in (False, True):
-        with suppress(FitRefused):
+        with suppress(DataRefused):
             locate(contacts, model, Prior(np.eye(3)), accuracy, noise, strikes=strikes, judged=judged)
 
 

@@ -15,7 +15,7 @@ from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
 from harness.effects.accuracy import Accuracy, Knob, Level, Setting
-from harness.experiment.experiment import Experiment, Measurement, RunCell, Say, Scored
+from harness.experiment.experiment import Answering, Experiment, Measurement, RunCell, Say, Scored
 from harness.experiment.in_process import performed, recorded
 from harness.experiment.levels import chosen_levels
 from harness.experiment.lookup import named
@@ -75,9 +75,9 @@ class PlainRun:
         """It can be answered at every setting."""
 
     def load(self, settings: Sequence[Setting]) -> None:
-        """Answer once at each setting."""
+        """Load the kernels of every setting: an experiment does as it makes its readings."""
         for setting in settings:
-            self.solve(self, setting)
+            self._answering(setting)
 
     def prepare(self, _setting: Setting) -> None:
         """Nothing is known to depend on the object alone."""
@@ -100,17 +100,22 @@ class PlainRun:
         Raises:
             FitRefused: nothing explains the readings.
         """
+        return dict(self.accepted(setting).found)
+
+    def accepted(self, setting: Setting) -> Solved:
+        """Answer at a setting.
+
+        Raises:
+            FitRefused: nothing explains the readings.
+        """
         solved = self.solve(self, setting)
         if solved.refusal is not None:
             raise FitRefused(solved.refusal)
-        found: dict[str, Any] = solved.found
-        return found
+        return solved
 
     def solve(self, _readings: "PlainRun", setting: Setting) -> Solved:
         """The answer as JSON values, timed from the first reading on."""
-        run = RunFiles(self.recording)
-        accuracy = chosen_levels(self.experiment.knobs, (), run.network_levels).with_(setting)
-        answering = self.experiment.answering(run, accuracy)
+        run, accuracy, answering = self._answering(setting)
         records = [record for record in self.recording.steps() if record.step.index < self.steps]
         answer, refusal = None, None
         cpu, wall = time.process_time(), time.perf_counter()
@@ -128,6 +133,11 @@ class PlainRun:
             truth = replace(truth, points={k: v for k, v in truth.points.items() if k < self.steps})
         result = self.experiment.result(Scored(run, answering, answer, truth, accuracy, ()))
         return Solved(result, result.get("credible90_m"), cpu, wall)
+
+    def _answering(self, setting: Setting) -> tuple[RunFiles, Accuracy, Answering]:
+        run = RunFiles(self.recording)
+        accuracy = chosen_levels(self.experiment.knobs, (), run.network_levels).with_(setting)
+        return run, accuracy, self.experiment.answering(run, accuracy)
 
     def described(self, solved: Solved) -> dict[str, Any]:
         """Where its answer is a place, that; its error."""
@@ -160,9 +170,17 @@ class PlainCase:
     def sample(self, setting: Setting, steps: int) -> Sample:
         """The error and the seconds of an answer from the first steps."""
         run = replace(self.run, steps=steps)
-        error = run.result(setting)["error_m"]  # and what is compiled for it is loaded
-        solved, work = run.solve(run, setting), run.work(setting)
-        return Sample(self.cell.name, run.object, error, solved.radius, 0.0, solved.cpu, solved.wall, work)
+        solved, work = run.accepted(setting), run.work(setting)
+        return Sample(
+            self.cell.name,
+            run.object,
+            solved.found["error_m"],
+            solved.radius,
+            0.0,
+            solved.cpu,
+            solved.wall,
+            work,
+        )
 
 
 def plain_measurement(name: str, *knobs: Knob[Level]) -> Measurement:
