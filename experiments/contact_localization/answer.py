@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from harness.basics.symmetry import SymmetryGroup, find_symmetries
 from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy, Level, Setting
 from harness.effects.touch import SHAPES as TOUCH
+from harness.experiment.experiment import Scored
 from harness.experiment.solving import Solved
 from harness.recording.observation import Observation, in_time
 from harness.recording.run_folder import RunFiles
@@ -127,7 +129,7 @@ def synthetic_strikes(modes: Modes, points: FloatArray) -> tuple[Strike, ...]:
     )
 
 
-def solve(readings: Readings, setting: Setting) -> Solved:
+def solve(readings: Readings, setting: Setting) -> Solved[Estimate]:
     """Answer at one setting, timed; call ``prepare`` and ``load_kernels`` before."""
     accuracy = accuracy_at(setting)
     cpu, wall = time.process_time(), time.perf_counter()
@@ -296,3 +298,7 @@ def prior_of(run: RunFiles) -> Prior:
 def observe(run: RunFiles) -> tuple[Observation, ...]:
     """The contacts of a run, from its images, arm poses and strikes."""
     return in_time([run.observe(record) for record in run.recording.steps()])
+
+
+ScoredContact: TypeAlias = Scored[ContactAnswering, Answer]
+"""An answer with what it is compared with."""

@@ -40,6 +40,7 @@ EXPERIMENT = Experiment(
     plan=plan,
     performer=_performer,
     answering=ContactAnswering,
+    estimate=ContactAnswering.answer,
     result=result_of,
     lines=answer_lines,
     sources=sources,

@@ -35,7 +35,6 @@ from harness.basics.errors import DataRefused, FitRefused
 from harness.bench.acquisition import Strike
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
-from harness.experiment.experiment import Experiment
 from harness.experiment.levels import chosen_levels
 from harness.experiment.lookup import named
 from harness.experiment.plain import perform_in_process
@@ -91,7 +90,7 @@ def run_cell(
     Raises:
         DataRefused: nothing was read, or ``[scale] paper_networks`` has no network that may be run.
     """
-    experiment: Experiment = named("scale-estimation")
+    experiment = named("scale-estimation")
     stated = scene.section(Scale).paper_networks
     networks = {} if stated is None else paper_networks(Path(stated))
     here = scene_of(scene, cell)

@@ -36,7 +36,7 @@ from harness.basics.faces.nearest_surface import NearestSurface
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
-from harness.experiment.experiment import Experiment, MeasuredColumn
+from harness.experiment.experiment import MeasuredColumn
 from harness.experiment.lookup import named
 from harness.experiment.plain import perform_in_process
 from harness.experiment.truth import read_truth
@@ -149,7 +149,7 @@ def run_cell(
         DataRefused: the true surface is unknown, or ``[shape] pcn`` has no network that may be run.
         WrongUse: ``[shape] library`` is no folder, or holds no shape that can be used.
     """
-    experiment: Experiment = named(NAME)
+    experiment = named(NAME)
     here, asked = scene_of(scene, cell), scene.section(ShapeRun)
     networks = [] if asked.pcn is None else paper_completions(Path(asked.pcn))
     shapes, left_out = ([], []) if asked.library is None else library_of(Path(asked.library))

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from harness.basics.errors import DataRefused, FitRefused, MeshRefused, PictureR
 from harness.basics.materials import MATERIALS
 from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy
+from harness.experiment.experiment import Scored
 from harness.experiment.object_modes import carried_by
 from harness.picture.outline import SeenOutline, read_outline
 from harness.recording.observation import Observation, picture_left_out
@@ -321,3 +323,7 @@ def peaks_of(strikes: Sequence[Strike]) -> Peaks | None:
     levels = found.loudest + np.array([peak.level for peak in peaks])
     decays = np.array([peak.damping for peak in peaks])
     return Peaks(frequencies, levels, found.band, settings.decay, decays)
+
+
+ScoredSize: TypeAlias = Scored[ScaleAnswering, SizeAnswer]
+"""An answer with what it is compared with."""

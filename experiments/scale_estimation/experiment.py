@@ -13,7 +13,7 @@ from experiments.scale_estimation.result import lines_of, result_of
 from experiments.scale_estimation.section import Scale
 from harness.effects.accuracy import Accuracy, Setting
 from harness.experiment.experiment import Experiment, MeasuredCondition
-from harness.experiment.plain import PlainPerforms, plain_budgets, plain_measurement
+from harness.experiment.plain import measure_by_knobs, plain_budgets
 from harness.recording.run_folder import RunFiles
 from harness.skills.exploring.exploration import PLAN_KEY
 
@@ -26,7 +26,7 @@ def _answering(run: RunFiles, accuracy: Accuracy) -> ScaleAnswering:
     return answering
 
 
-_ALL_DIALS = plain_measurement(NAME, STARTS)
+_ALL_DIALS = measure_by_knobs(NAME, cells, scene_of, STARTS)
 
 
 def _settings(thorough: bool, chosen: Mapping[str, Sequence[str]], scenes: Any) -> tuple[Setting, ...]:
@@ -42,9 +42,7 @@ MEASUREMENT = replace(
         MeasuredCondition("look", LOOKING, ("yes",), ("yes",)),
         MeasuredCondition("shape", DRAWN, ("known",), ("known",)),
     ),
-    cells=cells,
     settings=_settings,
-    performed=PlainPerforms(NAME, scene_of),
     counts=(4, 11),
 )
 
@@ -57,6 +55,7 @@ EXPERIMENT = Experiment(
     plan=plan,
     performer=performer,
     answering=_answering,
+    estimate=ScaleAnswering.answer,
     result=result_of,
     lines=lines_of,
     sources=lambda _scored: {},  # readings are simulated at the CAD model's size only

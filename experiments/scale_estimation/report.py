@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
+from experiments.scale_estimation.answer import ScaleAnswering, ScoredSize, SizeAnswer
 from experiments.scale_estimation.contact_planning import placed
 from experiments.scale_estimation.touch.touch import Touch
 from experiments.scale_estimation.unseen.spectrogram import FRAMES, bands_of, levels_of, response_of
@@ -15,7 +15,6 @@ from harness.basics.materials import MATERIALS
 from harness.basics.mesh_hull import hull_of
 from harness.bench.device import Health
 from harness.experiment.compare import Comparison
-from harness.experiment.experiment import Scored
 from harness.experiment.lookup import named
 from harness.picture.outline import SeenOutline, corners_of
 from harness.recording.observation import IMAGE
@@ -34,7 +33,9 @@ from harness.report.run_page import PageSection, write_run_page
 _NAME = "scale-estimation"
 
 
-def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path) -> Path:
+def write(
+    scored: ScoredSize, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path
+) -> Path:
     """Draw the report; the path of its page."""
     folder.mkdir(parents=True, exist_ok=True)
     album = Album(folder)
@@ -51,7 +52,7 @@ def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] |
     return write_run_page(named(_NAME), scored, comparison, health, folder, tuple(sections))
 
 
-def _believed(scored: Scored, album: Album) -> PageSection:
+def _believed(scored: ScoredSize, album: Album) -> PageSection:
     found: SizeAnswer = scored.found
     sizes = scored.answering.model.sizes
     beliefs = {

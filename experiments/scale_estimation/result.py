@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.scale_estimation.answer import OUTSIDE, Said, SizeAnswer
+from experiments.scale_estimation.answer import OUTSIDE, Said, ScoredSize, SizeAnswer
 from experiments.scale_estimation.size import Belief
 from experiments.scale_estimation.sound.hearing import Hearing
 from experiments.scale_estimation.touch.touch import Touch, doubted_cost
 from experiments.scale_estimation.unseen.answer import ShapelessAnswer
 from harness.basics.errors import FitRefused
-from harness.experiment.experiment import Scored
 
 OPEN = 0.5
 """Of the width of what is known without any reading: an interval wider than that leaves the size open."""
@@ -24,7 +23,7 @@ _NARROWED_BY = {
 }
 
 
-def result_of(scored: Scored) -> dict[str, Any]:
+def result_of(scored: ScoredSize) -> dict[str, Any]:
     """The answer as JSON values; keys carry their unit."""
     found: SizeAnswer = scored.found
     truth = None if scored.truth is None else scored.truth.differences.get("longest_side_m")

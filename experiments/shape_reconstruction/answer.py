@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.methods import METHOD, estimated, load_kernels
@@ -10,6 +11,7 @@ from experiments.shape_reconstruction.readings import ShapeReadings
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, WrongUse
 from harness.effects.accuracy import Accuracy
+from harness.experiment.experiment import Scored
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 from harness.skills.exploring.exploration import SKIPPED
@@ -107,3 +109,7 @@ class ShapeAnswering:
         """Methods that know an average answer from nothing: not where all pictures were refused."""
         if self.readings.refused_pictures and not evidence.touches and evidence.look is None:
             raise FitRefused(f"no reading is left; {self.readings.refused_pictures[0]}")
+
+
+ScoredShape: TypeAlias = Scored[ShapeAnswering, ShapeAnswer]
+"""An answer with what it is compared with."""

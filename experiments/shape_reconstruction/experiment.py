@@ -10,16 +10,14 @@ from experiments.shape_reconstruction.report import write
 from experiments.shape_reconstruction.result import lines_of, result_of, write_files
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.experiment.experiment import Experiment, MeasuredCondition
-from harness.experiment.plain import PlainPerforms, plain_budgets, plain_measurement
+from harness.experiment.plain import measure_by_knobs, plain_budgets
 from harness.skills.exploring.exploration import PLAN_KEY
 
 NAME = "shape-reconstruction"
 
 MEASUREMENT = replace(
-    plain_measurement(NAME, *OWN),
+    measure_by_knobs(NAME, cells, scene_of, *OWN),
     conditions=(MeasuredCondition("choose", CHOICES, ("planned",), ("planned",)),),
-    cells=cells,
-    performed=PlainPerforms(NAME, scene_of),
     counts=(9, 17, 33),
     gross=10.0e-3,
     subjects=MORE_OBJECTS,
@@ -34,6 +32,7 @@ EXPERIMENT = Experiment(
     plan=plan,
     performer=performer,
     answering=ShapeAnswering,
+    estimate=ShapeAnswering.answer,
     result=result_of,
     lines=lines_of,
     sources=lambda _scored: {},  # readings are simulated on an object that is known

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.shape_reconstruction.answer import ShapeAnswer
+from experiments.shape_reconstruction.answer import ScoredShape, ShapeAnswer
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.explore.running import live_estimates, live_method
 from experiments.shape_reconstruction.metric import band_held, shape_error, surfaces_apart
@@ -15,7 +15,6 @@ from experiments.shape_reconstruction.surface import SEEN, TOUCHED, ShapeEstimat
 from harness.basics.mesh import Mesh
 from harness.bench.device import Health
 from harness.experiment.compare import Comparison
-from harness.experiment.experiment import Scored
 from harness.experiment.lookup import named
 from harness.recording.observation import IMAGE
 from harness.report.figures.figures import Album
@@ -36,7 +35,9 @@ _SAMPLES = 2000
 """On each surface, for an error to a tenth of a millimetre."""
 
 
-def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path) -> Path:
+def write(
+    scored: ScoredShape, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path
+) -> Path:
     """Draw the report; the path of its page."""
     folder.mkdir(parents=True, exist_ok=True)
     album, truth = Album(folder), true_surface(scored.run, scored.truth)
@@ -100,7 +101,7 @@ def _shown(estimate: ShapeEstimate, evidence: ShapeEvidence) -> KnownSurface:
     return KnownSurface(estimate.mesh, estimate.deviation, contacts, passed)
 
 
-def _strip(scored: Scored, answer: ShapeAnswer, truth: Mesh | None, album: Album) -> PageSection:
+def _strip(scored: ScoredShape, answer: ShapeAnswer, truth: Mesh | None, album: Album) -> PageSection:
     method = live_method(scored.run.scene.section(ShapeRun).choose)
     found = []
     for live in live_estimates(answer.evidence, method):

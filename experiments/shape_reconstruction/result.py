@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from experiments.shape_reconstruction.answer import SENSES, ShapeAnswer
+from experiments.shape_reconstruction.answer import SENSES, ScoredShape, ShapeAnswer
 from experiments.shape_reconstruction.methods import METHOD
 from experiments.shape_reconstruction.metric import published_chamfer, shape_error
 from experiments.shape_reconstruction.readings import base_from_stand
@@ -19,7 +19,6 @@ from harness.basics.errors import DataRefused, FitRefused
 from harness.basics.geometry import apply, inverse, rotation_about, transform
 from harness.basics.mesh import Mesh
 from harness.basics.whole_file import write_bytes_whole
-from harness.experiment.experiment import Scored
 from harness.experiment.truth import Truth
 from harness.recording.run_folder import RunFiles
 from harness.sim.solid.surface_samples import random_points
@@ -40,7 +39,7 @@ def true_surface(run: RunFiles, truth: Truth | None) -> Mesh | None:
     return Mesh(apply(inverse(base_from_stand(run)), truth.surface.vertices), truth.surface.faces)
 
 
-def result_of(scored: Scored) -> dict[str, Any]:
+def result_of(scored: ScoredShape) -> dict[str, Any]:
     """The answer as JSON values; keys carry their unit."""
     answer: ShapeAnswer = scored.found
     truth = true_surface(scored.run, scored.truth)
@@ -98,7 +97,7 @@ def stem_of(sense: str) -> str:
     return f"shape-{sense}"
 
 
-def write_files(scored: Scored, folder: Path) -> None:
+def write_files(scored: ScoredShape, folder: Path) -> None:
     """Every estimate's surface, as the result names it."""
     answer: ShapeAnswer = scored.found
     for sense, one in answer.by_sense.items():
@@ -106,7 +105,7 @@ def write_files(scored: Scored, folder: Path) -> None:
             write_estimate(one, folder, stem_of(sense))
 
 
-def _warnings(scored: Scored, answer: ShapeAnswer) -> list[str]:
+def _warnings(scored: ScoredShape, answer: ShapeAnswer) -> list[str]:
     said = [f"{sense}: {one}" for sense, one in answer.by_sense.items() if isinstance(one, FitRefused)]
     fused, left_out = answer.fused, scored.answering.left_out
     said += [*scored.answering.readings.refused_pictures, *(f"shape: {flag}" for flag in fused.flags)]

@@ -4,20 +4,29 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Generic, TypeVar
 
 from harness.agreement.compare_run import agreement_of
 from harness.agreement.subject import own_subject
 from harness.basics.clock import now
 from harness.basics.errors import RecordingDamaged, WrongUse
 from harness.basics.files.foreign_file import MOST_JSON, read_bounded
+from harness.basics.files.json_file import JsonObject
 from harness.basics.npz_file import write_arrays
 from harness.basics.whole_file import write_text_whole
 from harness.bench.device import Health
 from harness.effects.accuracy import Accuracy, Level, current_levels
 from harness.effects.explain import as_json, scene_plan
 from harness.experiment.compare import Comparison, compare
-from harness.experiment.experiment import Answering, Experiment, Scored
+from harness.experiment.experiment import (
+    Answer_co,
+    Answering,
+    AnyExperiment,
+    AnyScored,
+    Experiment,
+    Readings_co,
+    Scored,
+)
 from harness.experiment.truth import truth_or_notes
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
@@ -29,14 +38,18 @@ RESULT = "result.json"
 OBSERVED = "observed.npz"
 """Beside it: what the scene observes, simulated at the answer."""
 
-Publish = Callable[[Mapping[str, Any]], None]
-Draw = Callable[[Scored, Comparison, Mapping[str, Health] | None, Path], Path]
+Publish = Callable[[JsonObject], None]
+Draw = Callable[[AnyScored, Comparison, Mapping[str, Health] | None, Path], Path]
 """Draws the report of an experiment that has no page of its own."""
 
 
+R = TypeVar("R", bound=Answering)
+A = TypeVar("A")
+
+
 def score(
-    experiment: Experiment, run: RunFiles, accuracy: Accuracy, answering: Answering | None = None
-) -> Scored:
+    experiment: Experiment[R, A], run: RunFiles, accuracy: Accuracy, answering: R | None = None
+) -> Scored[R, A]:
     """Answer, and look at the truth where there is one.
 
     Args:
@@ -55,14 +68,14 @@ def score(
         answering = experiment.answering(run, accuracy)
         for record in recording.steps():
             answering.read(record)
-    found = answering.answer()
+    found = experiment.estimate(answering)
     truth, notes = truth_or_notes(recording)
     warnings = (*recording.header.plan.get("warnings", ()), *recording.order_notes(), *notes)
     scored = Scored(run, answering, found, truth, accuracy, warnings)
     return replace(scored, result=experiment.result(scored))
 
 
-def require_steps(experiment: Experiment, recording: Recording) -> None:
+def require_steps(experiment: AnyExperiment, recording: Recording) -> None:
     """Refuse a run of which nothing was performed: ``WrongUse``."""
     if recording.committed == 0:
         raise WrongUse(
@@ -71,7 +84,7 @@ def require_steps(experiment: Experiment, recording: Recording) -> None:
 
 
 def finish(
-    experiment: Experiment,
+    experiment: AnyExperiment,
     run: RunFiles,
     accuracy: Accuracy,
     draw: Draw,
@@ -79,9 +92,9 @@ def finish(
     folder: Path | None = None,
     answering: Answering | None = None,
     publish: Publish = lambda _: None,
-    more: Mapping[str, Any] | None = None,
+    more: JsonObject | None = None,
     since: float | None = None,
-) -> dict[str, Any]:
+) -> JsonObject:
     """The result of a run: written and published once it is known, then again with what the report adds.
 
     Args:
@@ -102,23 +115,23 @@ def finish(
 
 
 @dataclass(frozen=True, eq=False)
-class WrittenAnswer:
+class WrittenAnswer(Generic[Readings_co, Answer_co]):
     """An answer that is written and published, and not yet compared."""
 
-    scored: Scored  #: the answer.
-    result: dict[str, Any]  #: as it was written.
+    scored: Scored[Readings_co, Answer_co]  #: the answer.
+    result: JsonObject  #: as it was written.
 
 
 def write_answer(
-    experiment: Experiment,
+    experiment: Experiment[R, A],
     run: RunFiles,
     accuracy: Accuracy,
     folder: Path,
-    answering: Answering | None = None,
+    answering: R | None = None,
     publish: Publish = lambda _: None,
-    more: Mapping[str, Any] | None = None,
+    more: JsonObject | None = None,
     since: float | None = None,
-) -> WrittenAnswer:
+) -> WrittenAnswer[R, A]:
     """Answer, write ``result.json``, publish; the arguments are ``finish``'s."""
     scored = score(experiment, run, accuracy, answering)
     result = {**common(experiment, scored), **scored.result, **(more or {})}
@@ -133,12 +146,12 @@ def write_answer(
 
 
 def add_report(
-    experiment: Experiment,
-    written: WrittenAnswer,
+    experiment: AnyExperiment,
+    written: WrittenAnswer[Answering, object],
     draw: Draw,
     health: Mapping[str, Health] | None,
     folder: Path,
-) -> dict[str, Any]:
+) -> JsonObject:
     """Compare, draw the report, and write the result again with both; the arguments are ``finish``'s."""
     scored = written.scored
     own = own_subject(scored.run, scored.accuracy)
@@ -163,7 +176,7 @@ def add_report(
     return result
 
 
-def common(experiment: Experiment, scored: Scored) -> dict[str, Any]:
+def common(experiment: AnyExperiment, scored: AnyScored) -> JsonObject:
     """What every result holds; keys carry their unit."""
     recording = scored.run.recording
     return {
@@ -180,7 +193,7 @@ def common(experiment: Experiment, scored: Scored) -> dict[str, Any]:
     }
 
 
-def levels_of_result(experiment: Experiment, folder: Path) -> dict[str, Level]:
+def levels_of_result(experiment: AnyExperiment, folder: Path) -> dict[str, Level]:
     """The levels that the result in a folder was found at; none where it has no result.
 
     Raises:
@@ -198,6 +211,6 @@ def levels_of_result(experiment: Experiment, folder: Path) -> dict[str, Level]:
         ) from error
 
 
-def _write(path: Path, result: Mapping[str, Any]) -> None:
+def _write(path: Path, result: JsonObject) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text_whole(path, json.dumps(result, indent=1, allow_nan=False) + "\n")

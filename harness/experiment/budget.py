@@ -1,20 +1,21 @@
 """Answer a run within a budget of seconds, or to an error: the levels come from the measured front."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Generic
 
 import numpy as np
 
+from harness.basics.files.json_file import JsonObject
 from harness.cost.bounds import most_seconds
 from harness.cost.choice import for_budget, for_error
 from harness.cost.curve import Point
 from harness.cost.promise import promise
 from harness.experiment.answer import require_steps
-from harness.experiment.experiment import Experiment
+from harness.experiment.experiment import AnyExperiment
 from harness.experiment.front import Front, budgets_of
-from harness.experiment.solving import Shared, Solved, Solver, Target
+from harness.experiment.solving import Found, ReadingsT, Solved, Solver, Target
 from harness.experiment.tables import measurement_of
 from harness.recording.run_folder import RunFiles
 
@@ -23,11 +24,11 @@ _NOTHING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class BudgetedAnswer:
+class BudgetedAnswer(Generic[Found]):
     """An answer as it was asked for."""
 
     point: Point  #: the setting that gave it.
-    solved: Solved  #: the answer itself.
+    solved: Solved[Found]  #: the answer itself.
     seconds: float  #: s on the clock, from readings to answer.
     cpu: float  #: s of CPU time, likewise.
     predicted: float  #: s it was expected to take at most.
@@ -36,7 +37,7 @@ class BudgetedAnswer:
     tried: tuple[str, ...]  #: names of the settings tried, in order.
 
 
-def answer_as_asked(experiment: Experiment, files: RunFiles, front: Front, target: Target) -> dict[str, Any]:
+def answer_as_asked(experiment: AnyExperiment, files: RunFiles, front: Front, target: Target) -> JsonObject:
     """Answer a recorded run as asked, then once more at the finest levels.
 
     The seconds are from readings in memory to the answer. What depends on the object alone, its
@@ -87,7 +88,7 @@ def answer_as_asked(experiment: Experiment, files: RunFiles, front: Front, targe
     }
 
 
-def ask(run: Solver, front: Front, target: Target) -> BudgetedAnswer:
+def ask(run: Solver[ReadingsT, Found], front: Front, target: Target) -> BudgetedAnswer[Found]:
     """Answer a run as asked; what is prepared before is not counted.
 
     Args:
@@ -112,7 +113,7 @@ def ask(run: Solver, front: Front, target: Target) -> BudgetedAnswer:
     return BudgetedAnswer(point, solved, taken[1], taken[0], predicted, promised, kept, tried)
 
 
-def _candidates(run: Solver, front: Front, target: Target) -> tuple[Point, ...]:
+def _candidates(run: Solver[ReadingsT, Found], front: Front, target: Target) -> tuple[Point, ...]:
     """What may be taken, and is prepared for.
 
     For an error its tries; for a budget what fits on a machine as fast as the curve's and, should
@@ -139,8 +140,8 @@ def _candidates(run: Solver, front: Front, target: Target) -> tuple[Point, ...]:
 
 
 def _in_time(
-    run: Solver, front: Front, seconds: float, candidates: Sequence[Point]
-) -> tuple[Point, Solved, float]:
+    run: Solver[ReadingsT, Found], front: Front, seconds: float, candidates: Sequence[Point]
+) -> tuple[Point, Solved[Found], float]:
     start = time.perf_counter()
     work = run.work(candidates[0].levels)
     counting = time.perf_counter() - start
@@ -159,10 +160,10 @@ def _in_time(
 
 
 def _to_error(
-    run: Solver, front: Front, error: float, candidates: Sequence[Point]
-) -> tuple[Point, Solved, float, tuple[str, ...]]:
+    run: Solver[ReadingsT, Found], front: Front, error: float, candidates: Sequence[Point]
+) -> tuple[Point, Solved[Found], float, tuple[str, ...]]:
     tried: list[str] = []
-    readings: Shared | None = None
+    readings: ReadingsT | None = None
     whole, spent = False, 0.0
     for point in candidates:
         tried.append(point.name)
@@ -181,13 +182,13 @@ def _shares(point: Point) -> bool:
     return any(sample.shared > 0.0 for sample in point.samples)
 
 
-def _promise(run: Solver, front: Front, point: Point, solved: Solved) -> float:
+def _promise(run: Solver[ReadingsT, Found], front: Front, point: Point, solved: Solved[Found]) -> float:
     if solved.radius is None or not front.vouches:
         return float("inf")
     return promise(point, solved.radius, run.object)
 
 
-def sentences(experiment: Experiment, cost: Mapping[str, Any]) -> tuple[str, ...]:
+def sentences(experiment: AnyExperiment, cost: JsonObject) -> tuple[str, ...]:
     """For people, what ``answer_as_asked`` gave."""
     finest, said = cost["finest"], []
     if finest["refused"] is not None:
@@ -201,7 +202,7 @@ def sentences(experiment: Experiment, cost: Mapping[str, Any]) -> tuple[str, ...
     return _took(experiment, cost), f"the finest levels ({finest['setting']}) {what}"
 
 
-def _took(experiment: Experiment, cost: Mapping[str, Any]) -> str:
+def _took(experiment: AnyExperiment, cost: JsonObject) -> str:
     budget, error = cost["asked"]["budget_s"], cost["asked"]["error_m"]
     took = f"{cost['seconds']:.2g} s ({cost['cpu_s']:.2g} s of CPU time) at {cost['setting']}"
     promise = cost["promised_error_m"]

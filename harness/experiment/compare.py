@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from harness.agreement.agreement import Agreement
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import MeshRefused, OutOfDomain, WrongUse
+from harness.basics.files.json_file import JsonObject
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.basics.store import Store, default_folder
@@ -22,7 +22,7 @@ from harness.effects.explain import scene_plan, without_sound
 from harness.effects.plan import Plan, default_accuracy
 from harness.effects.quantities import Quantities
 from harness.effects.touch import SHAPES as TOUCH
-from harness.experiment.experiment import Experiment, Scored
+from harness.experiment.experiment import AnyExperiment, AnyScored
 from harness.objectfile.vision.render import Rendered
 from harness.picture.pinhole import DirectionalLight
 from harness.recording.run_folder import RunFiles
@@ -44,7 +44,7 @@ class Comparison:
     agreement: Agreement | None = None
     """of the readings with a model of the object at the stated pose; None where not compared."""
 
-    def observed(self) -> dict[str, dict[str, Any]]:
+    def observed(self) -> dict[str, JsonObject]:
         """Every wanted quantity in JSON: shape and range of an array, parts of a mapping or a picture."""
         return {name: _described(self.evaluation[name]) for name in self.plan.wanted}
 
@@ -61,7 +61,7 @@ class Comparison:
 
 
 def require_sources(
-    experiment: Experiment, scene: SceneFile, station: Station, calibration: TactileCalibration
+    experiment: AnyExperiment, scene: SceneFile, station: Station, calibration: TactileCalibration
 ) -> None:
     """Refuse a scene that observes what no run of this experiment can simulate.
 
@@ -98,7 +98,7 @@ def require_sources(
         )
 
 
-def compare(scored: Scored, given: Quantities) -> Comparison:
+def compare(scored: AnyScored, given: Quantities) -> Comparison:
     """Simulate what the scene observes at the answer, and nothing else.
 
     Args:
@@ -115,7 +115,7 @@ def compare(scored: Scored, given: Quantities) -> Comparison:
         return replace(silent, notes=(*silent.notes, f"the object's sound is not simulated: {refusal}"))
 
 
-def _drawn_at(scored: Scored, scene: SceneFile, given: Quantities) -> Comparison:
+def _drawn_at(scored: AnyScored, scene: SceneFile, given: Quantities) -> Comparison:
     accuracy = scored.accuracy
     try:
         return _simulated(scored, scene, given, accuracy)
@@ -128,7 +128,7 @@ def _drawn_at(scored: Scored, scene: SceneFile, given: Quantities) -> Comparison
         return replace(instead, notes=(note,))
 
 
-def _simulated(scored: Scored, scene: SceneFile, given: Quantities, accuracy: Accuracy) -> Comparison:
+def _simulated(scored: AnyScored, scene: SceneFile, given: Quantities, accuracy: Accuracy) -> Comparison:
     run = scored.run
     plan = scene_plan(scene, run.station.gel.sensor, accuracy)
     sources: Quantities = {**_carried(run, plan), **given}
@@ -159,13 +159,13 @@ def _parts(value: object) -> Mapping[str, object] | None:
     return value if isinstance(value, Mapping) else None
 
 
-def _described(value: object) -> dict[str, Any]:
+def _described(value: object) -> JsonObject:
     parts = _parts(value)
     if parts is not None:
         return {"parts": {str(name): _described(part) for name, part in parts.items()}}
     if not isinstance(value, np.ndarray):
         return {"kind": type(value).__name__}
-    said: dict[str, Any] = {"shape": list(value.shape), "dtype": str(value.dtype)}
+    said: dict[str, object] = {"shape": list(value.shape), "dtype": str(value.dtype)}
     if value.size and np.issubdtype(value.dtype, np.number) and not np.iscomplexobj(value):
         finite = value[np.isfinite(value)]
         if finite.size:

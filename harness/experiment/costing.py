@@ -4,12 +4,13 @@ import datetime as dt
 import json
 import os
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
-from contextlib import nullcontext
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from harness.basics.errors import TouchstoneError
+from harness.basics.files.json_file import JsonObject
 from harness.basics.whole_file import write_text_whole
 from harness.basics.worker_pool import worker_pool
 from harness.bench.scene import SceneFile
@@ -18,7 +19,7 @@ from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import sample_from, sample_json
 from harness.cost.provenance import code, machine
 from harness.effects.accuracy import Level, Setting
-from harness.experiment.experiment import Experiment, Measurement, RunCase, RunCell, Say
+from harness.experiment.experiment import AnyExperiment, AnyMeasurement, RunCase, RunCell, Say
 from harness.experiment.tables import measurement_of
 
 _SCHEMA = 2
@@ -52,14 +53,14 @@ class Work:
 
 
 def measure(
-    experiment: Experiment,
+    experiment: AnyExperiment,
     work: Work,
     scenes: Mapping[str, SceneFile],
     station: Station,
     folder: Path,
     say: Say,
     workers: int = 1,
-    models: MutableMapping[str, Any] | None = None,
+    models: MutableMapping[str, object] | None = None,
 ) -> Iterator[tuple[RunCell, list[Point]]]:
     """Perform and answer every run that is not on the disk yet; one file a run.
 
@@ -85,7 +86,7 @@ def measure(
             cells = work.cells[first : first + _ROUND]
             known = {cell: _kept(folder / f"{cell.name}.json", stamp, work) for cell in cells}
             missing = [cell for cell, points in known.items() if points is None]
-            cases = measured.performed(missing, scenes, station, pool, models, say)
+            cases = dict(measured.performed(missing, scenes, station, pool, models, say))
             for cell in cells:
                 points = known[cell]
                 if points is None:
@@ -94,7 +95,7 @@ def measure(
                         case = cases.pop(cell)
                         points = _measured(measured, plural, case, work, say)
                         case.close()
-                    tree: dict[str, Any] = {**stamp, "work": _work_json(work)}
+                    tree: dict[str, object] = {**stamp, "work": _work_json(work)}
                     tree["points"] = [
                         {
                             "name": point.name,
@@ -108,7 +109,7 @@ def measure(
                 yield cell, points
 
 
-def _measured(measured: Measurement, plural: str, case: RunCase, work: Work, say: Say) -> list[Point]:
+def _measured(measured: AnyMeasurement, plural: str, case: RunCase, work: Work, say: Say) -> list[Point]:
     points = []
     try:
         for count, setting in work.asked:
@@ -122,14 +123,16 @@ def _measured(measured: Measurement, plural: str, case: RunCase, work: Work, say
     return points
 
 
-def workers_of(number: int) -> Any:
+def workers_of(number: int) -> AbstractContextManager[Executor | None]:
     """A pool of processes, as a context; None in it where this process does all."""
     return worker_pool(number) if number > 1 else nullcontext(None)
 
 
-def gathered(experiment: Experiment, points: Sequence[Point], title: str, notes: Sequence[str] = ()) -> Curve:
+def gathered(
+    experiment: AnyExperiment, points: Sequence[Point], title: str, notes: Sequence[str] = ()
+) -> Curve:
     """One curve of the points of many runs."""
-    merged: dict[tuple[Any, ...], tuple[Point, dict[str, Sample]]] = {}
+    merged: dict[tuple[object, ...], tuple[Point, dict[str, Sample]]] = {}
     for point in points:
         key = tuple(sorted(point.levels.items())), tuple(sorted(point.condition.items()))
         _, samples = merged.setdefault(key, (point, {}))
@@ -146,13 +149,13 @@ def gathered(experiment: Experiment, points: Sequence[Point], title: str, notes:
     )
 
 
-def joined(experiment: Experiment, old: Curve, new: Curve) -> Curve:
+def joined(experiment: AnyExperiment, old: Curve, new: Curve) -> Curve:
     """The new measurements beside the old ones of the same machine and code; the new ones win."""
     merged = gathered(experiment, [*new.points, *old.points], new.title)
     return replace(merged, made=new.made, notes=new.notes)
 
 
-def _kept(path: Path, stamp: Mapping[str, Any], work: Work) -> list[Point] | None:
+def _kept(path: Path, stamp: JsonObject, work: Work) -> list[Point] | None:
     """The points of a run measured before, by this machine, this code and for the same work."""
     if not path.exists():
         return None
@@ -166,5 +169,5 @@ def _kept(path: Path, stamp: Mapping[str, Any], work: Work) -> list[Point] | Non
     ]
 
 
-def _work_json(work: Work) -> dict[str, Any]:
+def _work_json(work: Work) -> JsonObject:
     return {"asked": [[count, dict(setting)] for count, setting in work.asked]}

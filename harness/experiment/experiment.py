@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Generic, Literal, Protocol, TypeAlias, TypeVar
 
+from harness.basics.files.json_file import JsonObject
 from harness.basics.mesh import Mesh
 from harness.bench.device import Health
 from harness.bench.scene import SceneFile, Section
@@ -20,13 +21,14 @@ from harness.effects.accuracy import Accuracy, Knob, Level, Setting
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
 from harness.effects.quantities import Quantities
-from harness.experiment.solving import Budgets
+from harness.experiment.solving import AnyBudgets
 from harness.experiment.truth import Truth
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import StepPerformer
 from harness.recording.step_file import StepRecord
 
 if TYPE_CHECKING:  # a report knows experiments and needs no simulator of the arm
+    from harness.experiment.compare import Comparison
     from harness.twin.bench import TwinBench
     from harness.twin.rehearsal import RehearsalReport
 
@@ -35,11 +37,11 @@ if TYPE_CHECKING:  # a report knows experiments and needs no simulator of the ar
 class Planned:
     """A run, planned and rehearsed."""
 
-    steps: Sequence[Mapping[str, Any]]  #: the parameters of each, as JSON values.
+    steps: Sequence[JsonObject]  #: the parameters of each.
     rehearsal: "RehearsalReport"  #: what the twin found.
     bench: "TwinBench"  #: the twin it was rehearsed in.
-    described: Mapping[str, Any] = field(default_factory=dict)
-    """more that ``run.json`` keeps of the plan, as JSON values."""
+    described: JsonObject = field(default_factory=dict)
+    """more that ``run.json`` keeps of the plan."""
     on_the_way: int = 0  #: how many steps are planned, and rehearsed, once those before them are read.
 
 
@@ -53,31 +55,31 @@ class Helpers:
 
 
 class Answering(Protocol):
-    """Readings to answer: each step is read once, and all that needs the readings has them from here."""
+    """Readings of a run: each step is read once, and all that needs the readings has them from here."""
 
     def read(self, record: StepRecord) -> None:
         """Take in one step's readings, in order."""
 
-    def answer(self) -> Any:
-        """What the steps read so far say.
 
-        Raises:
-            FitRefused: nothing explains the readings.
-            WrongUse: no step was read.
-        """
+Readings_co = TypeVar("Readings_co", bound=Answering, covariant=True)
+Answer_co = TypeVar("Answer_co", covariant=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Scored:
-    """An answer with what it is held against."""
+class Scored(Generic[Readings_co, Answer_co]):
+    """An answer with what it is compared with."""
 
-    run: RunFiles  #: the folder.
-    answering: Any  #: the readings.
-    found: Any  #: the answer, as the experiment has it.
-    truth: Truth | None  #: of a mocked run.
-    accuracy: Accuracy  #: the chosen level of every dial.
-    warnings: tuple[str, ...]  #: what the operator should know.
-    result: Mapping[str, Any] = field(default_factory=dict)  #: the answer as JSON values.
+    run: RunFiles  #: folder of the run.
+    answering: Readings_co  #: the readings.
+    found: Answer_co  #: the answer.
+    truth: Truth | None  #: truth of a mocked run; None at a real bench.
+    accuracy: Accuracy  #: the chosen level of every knob.
+    warnings: tuple[str, ...]  #: warnings for the operator.
+    result: JsonObject = field(default_factory=dict)  #: the answer as JSON values.
+
+
+AnyScored: TypeAlias = Scored[Answering, object]
+"""A scored answer of any experiment."""
 
 
 @dataclass(frozen=True)
@@ -119,15 +121,6 @@ class RunCell(Protocol):
         """What was varied, by name; ``gap`` always among them."""
 
 
-class RunsCell(Protocol):
-    """Performs one run of a table in process and answers it by every method."""
-
-    def __call__(
-        self, cell: Any, scene: SceneFile, station: Station, recordings: Path | None = None
-    ) -> dict[str, Any]:
-        """The result as JSON values; the run itself is kept in, or taken from, the folder of recordings."""
-
-
 class RunCase(Protocol):
     """A performed run with its truth, to be answered at any setting."""
 
@@ -149,35 +142,37 @@ class RunCase(Protocol):
 Say = Callable[[str], None]
 
 
-class Perform(Protocol):
-    """Performs runs, side by side where there is a pool of processes; tells of each that could not be."""
-
-    def __call__(
-        self,
-        cells: Sequence[Any],
-        scenes: Mapping[str, SceneFile],
-        station: Station,
-        pool: Executor | None,
-        models: MutableMapping[str, Any],
-        say: Say,
-    ) -> dict[Any, Any]:
-        """The cases by cell; ``models`` is taken from and added to."""
+Cell_co = TypeVar("Cell_co", bound=RunCell, covariant=True)
+Models_co = TypeVar("Models_co", covariant=True)
 
 
 @dataclass(frozen=True)
-class Measurement:
-    """How tables and cost curves measure an experiment."""
+class Measurement(Generic[Cell_co, Models_co]):
+    """How tables and cost curves measure an experiment, by runs of ``Cell_co`` with ``Models_co``."""
 
     estimator: str  #: module whose sources, with all they import, decide whether a curve still holds.
     conditions: tuple[MeasuredCondition, ...]  #: what is varied beside object, gap and seed.
-    cells: Callable[[Sequence[str], Sequence[int], Mapping[str, Sequence[str]]], Sequence[Any]]
+    cells: Callable[[Sequence[str], Sequence[int], Mapping[str, Sequence[str]]], Sequence[Cell_co]]
     """the runs of so many objects, seeds and levels of the conditions, ``gap`` among them."""
-    run_cell: RunsCell
-    """performs one in process and answers it by every method: ``rows`` by method, each with ``error_m`` and
-    ``seconds``; a share of rows may have ``error_symmetric_m``, ``in_region90``, ``refused``, and ``gross``
-    where an error beyond ``gross`` m is not what a failure is."""
+    run_cell: Callable[[Cell_co, SceneFile, Station, Path | None], JsonObject]
+    """performs a run in process, or takes it from the folder of recordings, and answers it by every method:
+    ``rows`` by method, each with ``error_m`` and ``seconds``; a share of rows may have
+    ``error_symmetric_m``, ``in_region90``, ``refused``, and ``gross`` where an error beyond ``gross`` m is
+    not what a failure is."""
     methods: tuple[str, ...]  #: in the order of a table's rows.
-    performed: Perform  #: runs for a cost curve.
+    performed: Callable[
+        [
+            Sequence[Cell_co],
+            Mapping[str, SceneFile],
+            Station,
+            Executor | None,
+            MutableMapping[str, Models_co],
+            Say,
+        ],
+        Mapping[Cell_co, RunCase],
+    ]
+    """performs the runs of a cost curve, in parallel if there is a pool of processes, and reports each that
+    failed; models by object are taken from and added to the mapping."""
     settings: Callable[[bool, Mapping[str, Sequence[str]], Mapping[str, SceneFile]], Sequence[Setting]]
     """of the dials, that a cost curve measures: every one of them, or the usual ones."""
     setting_name: Callable[[Setting], str]  #: of a setting, for people.
@@ -186,7 +181,7 @@ class Measurement:
     counts: tuple[int, ...] = (1,)  #: of steps, that a cost curve measures where nobody says.
     regions: tuple[str, ...] = ()  #: methods whose 90 % region a table scores.
     gross: float = 20.0e-3  #: m: an error beyond this is a failure.
-    notes: Callable[[Mapping[str, Any]], tuple[str, ...]] = lambda _: ()
+    notes: Callable[[JsonObject], tuple[str, ...]] = lambda _: ()
     """sentences that a curve keeps, from the models made on the way."""
     published: Mapping[str, Sequence[float]] = field(default_factory=dict)
     """what others printed, by method; for the foot of a table."""
@@ -194,6 +189,10 @@ class Measurement:
     """real meshes beside those of every experiment: file under the data folder, units, material."""
     columns: tuple[MeasuredColumn, ...] = ()  #: means beside the errors, in the order of a table.
     per_object: tuple[str, ...] = ()  #: keys of rows, lengths, whose mean on each object is printed too.
+
+
+AnyMeasurement: TypeAlias = Measurement[RunCell, object]
+"""A measurement of any experiment; its cells and models go back to itself only."""
 
 
 @dataclass(frozen=True)
@@ -223,7 +222,7 @@ class Procedure:
     gap: str | None = None  #: of a mocked bench where none is asked for; None for the station's.
     observe: tuple[str, ...] | None = None
     """in place of what a scene file observes by default; None for just that."""
-    assumed: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    assumed: Mapping[str, JsonObject] = field(default_factory=dict)
     """tables and keys of a scene made from options, where they say nothing else."""
     error_key: str | None = None
     """of its table, that ``--error`` sets: the run itself ends when that is met; None where ``--error``
@@ -239,25 +238,31 @@ class Procedure:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Experiment(Procedure):
-    """One kind of question that a bench is asked."""
+class Experiment(Procedure, Generic[Readings_co, Answer_co]):
+    """An experiment whose readings are a ``Readings_co`` and whose answer is an ``Answer_co``."""
 
-    title: str  #: of its report.
-    knobs: tuple[Knob[Level], ...]  #: every dial that its answer and its comparison have.
-    answering: Callable[[RunFiles, Accuracy], Answering]  #: of a run, at an accuracy.
-    result: Callable[[Scored], dict[str, Any]]
+    title: str  #: title of its report.
+    knobs: tuple[Knob[Level], ...]  #: every knob of its answer and its comparison.
+    answering: Callable[[RunFiles, Accuracy], Readings_co]
+    """creates the readings of a run, makes what depends on the object alone, and loads all kernels."""
+    estimate: Callable[[Readings_co], Answer_co]
+    """computes the answer from the steps read so far; raises ``FitRefused`` if nothing explains them."""
+    result: Callable[[Scored[Readings_co, Answer_co]], JsonObject]
     """the answer as JSON values, keys with their units, with ``seconds`` and ``warnings``."""
-    lines: Callable[[Mapping[str, Any]], list[str]]  #: the answer for people, from the whole result.
-    sources: Callable[[Scored], Quantities]  #: what the answer gives the comparison.
+    lines: Callable[[JsonObject], list[str]]  #: human-readable answer, from the whole result.
+    sources: Callable[[Scored[Readings_co, Answer_co]], Quantities]  #: what the answer gives the comparison.
     gives: tuple[str, ...]
     """the names of those sources; what else a scene observes is refused before anything moves."""
-    report: Callable[[Scored, Any, Mapping[str, Health] | None, Path], Path] | None = None
+    report: (
+        Callable[[Scored[Readings_co, Answer_co], "Comparison", Mapping[str, Health] | None, Path], Path]
+        | None
+    ) = None
     """writes the page of a scored run; None for the plain page of every experiment."""
-    files: Callable[[Scored, Path], None] | None = None
+    files: Callable[[Scored[Readings_co, Answer_co], Path], None] | None = None
     """writes what the answer is beside its JSON values into the folder of ``result.json``, where the result
     names it; None for nothing."""
-    budgets: Budgets | None = None  #: answers to a budget or an error; None where it cannot.
-    measurement: Measurement | None = None  #: for tables and cost; None where it has none.
+    budgets: AnyBudgets | None = None  #: answers to a budget or an error; None where it cannot.
+    measurement: AnyMeasurement | None = None  #: for tables and cost; None where it has none.
     measured: str = ""
     """what it finds of the object, so that no scene of it states it and readings have no model to be compared
     with: a sentence; empty where shape, size and pose are stated."""
@@ -267,3 +272,7 @@ class Experiment(Procedure):
         """Those dials that are not the simulation's."""
         simulated = {knob.name for knob in knobs_of(EFFECTS)}
         return tuple(knob for knob in self.knobs if knob.name not in simulated)
+
+
+AnyExperiment: TypeAlias = Experiment[Answering, object]
+"""An experiment that is known by its name alone; its readings go back to itself only."""

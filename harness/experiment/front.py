@@ -14,8 +14,8 @@ from harness.cost.promise import promise_share, smallest_promise, typical_promis
 from harness.cost.provenance import code, machine, stale
 from harness.effects.accuracy import Level, Setting
 from harness.effects.scene_object import known_object
-from harness.experiment.experiment import Experiment
-from harness.experiment.solving import Budgets, Target
+from harness.experiment.experiment import AnyExperiment
+from harness.experiment.solving import AnyBudgets, Target
 from harness.experiment.subjects import object_key
 from harness.experiment.tables import measurement_of
 from harness.recording.run_folder import RunFiles
@@ -62,7 +62,7 @@ class Front:
         return replace(self, points=points)
 
 
-def budgets_of(experiment: Experiment) -> Budgets:
+def budgets_of(experiment: AnyExperiment) -> AnyBudgets:
     """How an experiment keeps a budget.
 
     Raises:
@@ -73,7 +73,7 @@ def budgets_of(experiment: Experiment) -> Budgets:
     return experiment.budgets
 
 
-def front_for(experiment: Experiment, scene: SceneFile, steps: int) -> Front:
+def front_for(experiment: AnyExperiment, scene: SceneFile, steps: int) -> Front:
     """The curve of this machine, or the one that came with the program, for runs like this one.
 
     Raises:
@@ -98,7 +98,7 @@ def front_for(experiment: Experiment, scene: SceneFile, steps: int) -> Front:
     return front.fitting(lambda setting: budgets.unfit(scene, setting))
 
 
-def front_at_hand(experiment: Experiment, run: RunFiles) -> Front | None:
+def front_at_hand(experiment: AnyExperiment, run: RunFiles) -> Front | None:
     """Return the measured settings of runs like this one; None if no curve of this machine has them."""
     try:
         return front_for(experiment, run.scene, run.recording.committed)
@@ -107,7 +107,11 @@ def front_at_hand(experiment: Experiment, run: RunFiles) -> Front | None:
 
 
 def front_of(
-    experiment: Experiment, curve: Curve, wanted: Mapping[str, Level], reasons: Sequence[str], shipped: bool
+    experiment: AnyExperiment,
+    curve: Curve,
+    wanted: Mapping[str, Level],
+    reasons: Sequence[str],
+    shipped: bool,
 ) -> Front:
     """The settings of a curve for a condition, but for those that are not offered while there are others.
 
@@ -128,7 +132,7 @@ def front_of(
     return Front(points, scale, int(condition[count]), tuple(reasons), curve.made, shipped)
 
 
-def foresee(experiment: Experiment, scene: SceneFile, target: Target) -> str:
+def foresee(experiment: AnyExperiment, scene: SceneFile, target: Target) -> str:
     """What will be tried, in a sentence, before anything moves.
 
     Args:
@@ -181,7 +185,7 @@ _SPEED = 10.0
 """A stale curve refuses a budget only if a machine this many times as fast could not keep it either."""
 
 
-def doubts(experiment: Experiment, front: Front, target: Target) -> tuple[str, ...]:
+def doubts(experiment: AnyExperiment, front: Front, target: Target) -> tuple[str, ...]:
     """What the operator should know of the front before an answer goes by it."""
     said = [] if front.trusted else [staleness(experiment, front)]
     if target.error is not None and not front.vouches:
@@ -192,7 +196,7 @@ def doubts(experiment: Experiment, front: Front, target: Target) -> tuple[str, .
     return tuple(said)
 
 
-def staleness(experiment: Experiment, front: Front) -> str:
+def staleness(experiment: AnyExperiment, front: Front) -> str:
     """Why the front is not of this machine and code, what is done about it, and how to be rid of it."""
     kind = "the curve that came with the program" if front.shipped else "this machine's curve"
     return (

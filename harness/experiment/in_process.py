@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from harness.basics.errors import WrongUse
 from harness.basics.files.lock_file import hold_briefly
@@ -12,7 +11,7 @@ from harness.bench.gap import lasting_name
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.experiment.begin import begin
-from harness.experiment.experiment import Experiment, RunCell
+from harness.experiment.experiment import AnyExperiment, RunCell
 from harness.experiment.perform import IN_PROCESS_BENCH, perform_on
 from harness.experiment.truth import truth_paths
 from harness.recording.recording import Recording
@@ -21,7 +20,7 @@ from harness.recording.session import Quiet
 
 
 def performed(
-    experiment: Experiment, cell: RunCell, scene: SceneFile, station: Station, folder: Path
+    experiment: AnyExperiment, cell: RunCell, scene: SceneFile, station: Station, folder: Path
 ) -> Recording:
     """Plan, rehearse and perform a run.
 
@@ -40,7 +39,7 @@ def performed(
 
 
 def recorded(
-    experiment: Experiment, cell: RunCell, scene: SceneFile, station: Station, folder: Path
+    experiment: AnyExperiment, cell: RunCell, scene: SceneFile, station: Station, folder: Path
 ) -> Recording:
     """The run of a cell as it lies in a folder of recordings; performed and put there where it does not.
 
@@ -71,7 +70,7 @@ def recorded(
         return Recording(path)
 
 
-def _require_same(found: Recording, experiment: Experiment, cell: RunCell, scene: SceneFile) -> None:
+def _require_same(found: Recording, experiment: AnyExperiment, cell: RunCell, scene: SceneFile) -> None:
     header, gap = found.header, lasting_name(cell.conditions["gap"])
     differing = [
         name
@@ -92,7 +91,7 @@ def _require_same(found: Recording, experiment: Experiment, cell: RunCell, scene
         )
 
 
-def _within(wanted: Any, there: Any) -> bool:
+def _within(wanted: object, there: object) -> bool:
     """Whether all that a scene says is so in a recorded one, which says its defaults too."""
     if isinstance(wanted, Mapping) and isinstance(there, Mapping):
         return all(_within(value, there.get(key)) for key, value in wanted.items())

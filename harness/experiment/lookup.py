@@ -8,11 +8,11 @@ from pathlib import Path
 from harness.basics.errors import WrongUse
 from harness.basics.whole_file import make_folder
 from harness.bench.experiments import EXPERIMENTS, loaded, require_experiment
-from harness.experiment.experiment import Experiment
+from harness.experiment.experiment import AnyExperiment, Experiment
 from harness.recording.recording import Recording
 
 
-def named(name: str) -> Experiment:
+def named(name: str) -> AnyExperiment:
     """The experiment of this name.
 
     Raises:
@@ -23,7 +23,7 @@ def named(name: str) -> Experiment:
     return found
 
 
-def experiment_of(recording: Recording) -> Experiment:
+def experiment_of(recording: Recording) -> AnyExperiment:
     """The experiment that a run is of.
 
     Raises:

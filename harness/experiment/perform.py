@@ -1,12 +1,12 @@
 """Perform what is left of a run on its bench; a step's readings are taken in once it is on the disk."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 from harness.basics.clock import clock_offset_ns, now
+from harness.basics.files.json_file import JsonObject
 from harness.bench.device import Health
 from harness.bench.experiments import loaded
 from harness.bench.station import Bench, open_station
@@ -54,7 +54,7 @@ def describe_bench(recording: Recording) -> str:
     return "the real instruments" if mock is None else _BENCHES[_mocked_as(mock)]
 
 
-def _mocked_as(mock: Mapping[str, Any]) -> str:
+def _mocked_as(mock: JsonObject) -> str:
     """Return how a run's bench is mocked; runs older than the key used their wires."""
     return str(mock.get("bench", WIRES))
 

@@ -7,15 +7,24 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TypeVar
 
 from harness.basics.errors import FitRefused, TouchstoneError, WrongUse
+from harness.basics.files.json_file import JsonObject
 from harness.bench.experiments import EXPERIMENTS
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
 from harness.effects.accuracy import Accuracy, Knob, Level, Setting
-from harness.experiment.experiment import Answering, Experiment, Measurement, RunCell, Say, Scored
+from harness.experiment.experiment import (
+    Answering,
+    AnyExperiment,
+    Measurement,
+    RunCase,
+    RunCell,
+    Say,
+    Scored,
+)
 from harness.experiment.in_process import performed, recorded
 from harness.experiment.levels import chosen_levels
 from harness.experiment.lookup import named
@@ -60,7 +69,7 @@ class PlainCell:
 class PlainRun:
     """A recorded run, to be answered at any setting of the dials; settings share nothing."""
 
-    experiment: Experiment  #: that it is of.
+    experiment: AnyExperiment  #: that it is of.
     recording: Recording  #: of it.
     steps: int  #: from how many of its first steps.
     shared: tuple[float, float] = (0.0, 0.0)
@@ -94,26 +103,26 @@ class PlainRun:
         """Itself: each answer reads its steps."""
         return self
 
-    def result(self, setting: Setting) -> dict[str, Any]:
+    def result(self, setting: Setting) -> JsonObject:
         """The answer as JSON values.
 
         Raises:
             FitRefused: nothing explains the readings.
         """
-        return dict(self.accepted(setting).found)
+        return self.accepted(setting)[1]
 
-    def accepted(self, setting: Setting) -> Solved:
-        """Answer at a setting.
+    def accepted(self, setting: Setting) -> tuple[Solved[JsonObject], JsonObject]:
+        """Answer at a setting; the answer as JSON values once more.
 
         Raises:
             FitRefused: nothing explains the readings.
         """
         solved = self.solve(self, setting)
-        if solved.refusal is not None:
+        if solved.found is None:
             raise FitRefused(solved.refusal)
-        return solved
+        return solved, solved.found
 
-    def solve(self, _readings: "PlainRun", setting: Setting) -> Solved:
+    def solve(self, _readings: "PlainRun", setting: Setting) -> Solved[JsonObject]:
         """The answer as JSON values, timed from the first reading on."""
         run, accuracy, answering = self._answering(setting)
         records = [record for record in self.recording.steps() if record.step.index < self.steps]
@@ -122,7 +131,7 @@ class PlainRun:
         try:
             for record in records:
                 answering.read(record)
-            answer = answering.answer()
+            answer = self.experiment.estimate(answering)
         except FitRefused as error:
             refusal = str(error)
         cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
@@ -139,7 +148,7 @@ class PlainRun:
         accuracy = chosen_levels(self.experiment.knobs, (), run.network_levels).with_(setting)
         return run, accuracy, self.experiment.answering(run, accuracy)
 
-    def described(self, solved: Solved) -> dict[str, Any]:
+    def described(self, solved: Solved[JsonObject]) -> JsonObject:
         """Where its answer is a place, that; its error."""
         found = solved.found or {}
         return {
@@ -170,46 +179,88 @@ class PlainCase:
     def sample(self, setting: Setting, steps: int) -> Sample:
         """The error and the seconds of an answer from the first steps."""
         run = replace(self.run, steps=steps)
-        solved, work = run.accepted(setting), run.work(setting)
-        return Sample(
-            self.cell.name,
-            run.object,
-            solved.found["error_m"],
-            solved.radius,
-            0.0,
-            solved.cpu,
-            solved.wall,
-            work,
-        )
+        (solved, found), work = run.accepted(setting), run.work(setting)
+        error, radius = found["error_m"], solved.radius
+        return Sample(self.cell.name, run.object, error, radius, 0.0, solved.cpu, solved.wall, work)
 
 
-def plain_measurement(name: str, *knobs: Knob[Level]) -> Measurement:
-    """How an experiment is measured by its dials alone.
+Cell = TypeVar("Cell", bound=RunCell)
+
+
+def plain_measurement(name: str, *knobs: Knob[Level]) -> Measurement[PlainCell, object]:
+    """Measure an experiment in runs that differ in object, gap and seed alone; see ``measure_by_knobs``."""
+
+    def cells(
+        objects: Sequence[str], seeds: Sequence[int], chosen: Mapping[str, Sequence[str]]
+    ) -> list[PlainCell]:
+        return [PlainCell(name, gap, seed) for seed in seeds for gap in chosen["gap"] for name in objects]
+
+    return measure_by_knobs(name, cells, lambda scene, _: scene, *knobs)
+
+
+def measure_by_knobs(
+    name: str,
+    cells: Callable[[Sequence[str], Sequence[int], Mapping[str, Sequence[str]]], Sequence[Cell]],
+    scene_of: Callable[[SceneFile, Cell], SceneFile],
+    *knobs: Knob[Level],
+) -> Measurement[Cell, object]:
+    """Measure an experiment by its knobs alone.
 
     Args:
-        name: of the experiment, as in the table of experiments.
-        knobs: turned one at a time from their defaults.
+        name: name of the experiment in the table of experiments.
+        cells: creates the runs of so many objects, seeds and levels of the conditions.
+        scene_of: creates the scene of a run from that of its object.
+        knobs: knobs that are changed one at a time from their defaults.
     """
     settings: dict[str, Setting] = {DEFAULT: {knob.name: knob.default for knob in knobs}}
     for knob in knobs:
         for level in knob.levels:
             if level != knob.default:
                 settings[f"{knob.name} = {level}"] = {**settings[DEFAULT], knob.name: level}
+
+    def answer_cell(
+        cell: Cell, scene: SceneFile, station: Station, recordings: Path | None = None
+    ) -> JsonObject:
+        scene = scene_of(scene, cell)
+        with closing(perform_in_process(named(name), cell, scene, station, recordings)) as case:
+            run = case.run
+            rows = {title: run.result(levels) for title, levels in settings.items()}
+            return {"schema": 1, "cell": vars(cell), run.experiment.plural: run.steps, "rows": rows}
+
+    def perform_cells(
+        cells: Sequence[Cell],
+        scenes: Mapping[str, SceneFile],
+        station: Station,
+        _pool: Executor | None,
+        _models: MutableMapping[str, object],
+        say: Say,
+    ) -> dict[Cell, RunCase]:
+        found: dict[Cell, RunCase] = {}
+        for cell in cells:
+            try:
+                scene = scene_of(scenes[cell.object], cell)
+                found[cell] = perform_in_process(named(name), cell, scene, station)
+            except TouchstoneError as error:
+                say(f"{cell.name} was not performed: {error}")
+        return found
+
     return Measurement(
         estimator=str(EXPERIMENTS[name].value).partition(":")[0] if name in EXPERIMENTS else __name__,
         conditions=(),
-        cells=_cells,
-        run_cell=_Answers(name, settings),
+        cells=cells,
+        run_cell=answer_cell,
         methods=tuple(settings),
-        performed=PlainPerforms(name),
+        performed=perform_cells,
         settings=lambda _thorough, _chosen, _scenes: tuple(settings.values()),
         setting_name=lambda setting: next(
-            (name for name, levels in settings.items() if levels == setting), "every dial at its finest"
+            (title for title, levels in settings.items() if levels == setting), "every dial at its finest"
         ),
     )
 
 
-def plain_budgets(name: str, steps: Callable[[SceneFile], int], *knobs: Knob[Level]) -> Budgets:
+def plain_budgets(
+    name: str, steps: Callable[[SceneFile], int], *knobs: Knob[Level]
+) -> Budgets[PlainRun, JsonObject]:
     """How an experiment keeps a budget by its dials alone; errors are promised where it has ``credible90_m``.
 
     Args:
@@ -232,60 +283,12 @@ def plain_budgets(name: str, steps: Callable[[SceneFile], int], *knobs: Knob[Lev
     return Budgets(solver, {knob.name: knob.levels[-1] for knob in knobs}, steps, unfit=unfit)
 
 
-def _cells(
-    objects: Sequence[str], seeds: Sequence[int], chosen: Mapping[str, Sequence[str]]
-) -> list[PlainCell]:
-    return [PlainCell(name, gap, seed) for seed in seeds for gap in chosen["gap"] for name in objects]
-
-
-@dataclass(frozen=True)
-class _Answers:
-    """Performs a run in process and answers it at every setting."""
-
-    name: str
-    settings: Mapping[str, Setting]
-
-    def __call__(
-        self, cell: PlainCell, scene: SceneFile, station: Station, recordings: Path | None = None
-    ) -> dict[str, Any]:
-        with closing(perform_in_process(named(self.name), cell, scene, station, recordings)) as case:
-            run = case.run
-            found = {name: run.result(levels) for name, levels in self.settings.items()}
-            return {"schema": 1, "cell": vars(cell), run.experiment.plural: run.steps, "rows": found}
-
-
-@dataclass(frozen=True)
-class PlainPerforms:
-    """Performs the runs of a cost curve, one after the other."""
-
-    name: str  #: of the experiment.
-    scene_of: Callable[[SceneFile, Any], SceneFile] = lambda scene, _: scene
-    """the scene of a cell, from that of its object."""
-
-    def __call__(
-        self,
-        cells: Sequence[Any],
-        scenes: Mapping[str, SceneFile],
-        station: Station,
-        pool: Executor | None,
-        models: MutableMapping[str, Any],
-        say: Say,
-    ) -> dict[Any, Any]:
-        """The cases by cell; what could not be performed is said."""
-        del pool, models  # runs are few, and no model outlives its run
-        found = {}
-        for cell in cells:
-            try:
-                found[cell] = perform_in_process(
-                    named(self.name), cell, self.scene_of(scenes[cell.object], cell), station
-                )
-            except TouchstoneError as error:
-                say(f"{cell.name} was not performed: {error}")
-        return found
-
-
 def perform_in_process(
-    experiment: Experiment, cell: RunCell, scene: SceneFile, station: Station, recordings: Path | None = None
+    experiment: AnyExperiment,
+    cell: RunCell,
+    scene: SceneFile,
+    station: Station,
+    recordings: Path | None = None,
 ) -> PlainCase:
     """Plan, rehearse and perform a run on the mocked bench in process.
 

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Generic, Protocol, TypeAlias, TypeVar
 
 from harness.basics.errors import WrongUse
+from harness.basics.files.json_file import JsonObject
 from harness.bench.scene import SceneFile
 from harness.cost.curve import Curve
 from harness.effects.accuracy import Level, Setting
@@ -30,7 +31,7 @@ class Target:
         return {"budget_s": self.seconds, "error_m": self.error}
 
 
-def target_of(plan: Mapping[str, Any]) -> Target | None:
+def target_of(plan: JsonObject) -> Target | None:
     """The target that a run was planned with; None where it has none."""
     stored = plan.get(TARGET)
     return None if stored is None else Target(stored["budget_s"], stored["error_m"])
@@ -44,18 +45,24 @@ class Shared(Protocol):
         """S of CPU time and on the clock that this took."""
 
 
+ReadingsT = TypeVar("ReadingsT", bound=Shared)
+Found = TypeVar("Found")
+Found_co = TypeVar("Found_co", covariant=True)
+Shared_co = TypeVar("Shared_co", bound=Shared, covariant=True)
+
+
 @dataclass(frozen=True, eq=False)
-class Solved:
+class Solved(Generic[Found_co]):
     """An answer at one setting, and what it took beyond what settings share."""
 
-    found: Any  #: the answer, as the experiment has it; None where it was refused.
+    found: Found_co | None  #: the answer; None if it was refused.
     radius: float | None  #: m, within which the answer itself claims 90 %; None where it claims nothing.
     cpu: float  #: s of CPU time.
     wall: float  #: s on the clock.
     refusal: str | None = None  #: why, where it was refused.
 
 
-class Solver(Protocol):
+class Solver(Protocol[ReadingsT, Found]):
     """A run's readings in memory, to be answered at any setting."""
 
     @property
@@ -77,21 +84,21 @@ class Solver(Protocol):
     def work(self, setting: Setting) -> float | None:
         """How much there is to do, see ``harness.cost.curve.Sample``; None where it is not counted."""
 
-    def read(self, setting: Setting) -> Any:
-        """The readings as a setting takes them, ``Shared``."""
+    def read(self, setting: Setting) -> ReadingsT:
+        """Return the readings as a setting uses them."""
 
-    def solve(self, readings: Any, setting: Setting) -> Solved:
+    def solve(self, readings: ReadingsT, setting: Setting) -> Solved[Found]:
         """Answer at one setting, timed, from what ``read`` gave for this or another one."""
 
-    def described(self, solved: Solved) -> dict[str, Any]:
+    def described(self, solved: Solved[Found]) -> JsonObject:
         """As JSON values: ``position_m``, ``error_m`` and ``refused``, each None where there is none."""
 
 
 @dataclass(frozen=True, eq=False)
-class Budgets:
+class Budgets(Generic[Shared_co, Found_co]):
     """How an experiment answers as asked: within so many seconds, or to an error."""
 
-    solver: Callable[[RunFiles], Solver]  #: of a run's readings.
+    solver: Callable[[RunFiles], Solver[Shared_co, Found_co]]  #: of a run's readings.
     finest: Setting  #: the setting asked after an answer, to say what more time would have given.
     steps: Callable[[SceneFile], int]  #: that a run of a scene has.
     condition: Callable[[SceneFile], Mapping[str, Level]] = lambda _: {"gap": "default"}
@@ -101,3 +108,7 @@ class Budgets:
     offered: Callable[[Setting], bool] = lambda _: True
     """whether a setting is chosen while there are others."""
     shipped: Callable[[], Curve] | None = None  #: the curve that came with the program; None where none did.
+
+
+AnyBudgets: TypeAlias = Budgets[Shared, object]
+"""Budgets of any experiment; its readings go back to itself only."""

@@ -5,23 +5,23 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import TouchstoneError, WrongUse
+from harness.basics.files.json_file import JsonObject
 from harness.basics.metrics import Interval, bootstrap, mean, median
 from harness.basics.whole_file import write_text_whole
 from harness.basics.worker_pool import worker_pool
 from harness.bench.experiments import EXPERIMENTS, loaded
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import load_station, station_path
-from harness.experiment.experiment import Experiment, Measurement, RunCell
+from harness.experiment.experiment import AnyExperiment, AnyMeasurement, Measurement, RunCell
 from harness.experiment.lookup import named
 
-Results = Mapping[Any, Mapping[str, Any]]
-"""What every cell of a table came to; a cell is as ``harness.experiment.experiment.RunCell``."""
+Cell = TypeVar("Cell", bound=RunCell)
 
 KEYS = "scene.keys.json"
 """In a table's folder: what ``--set`` changed in the scene of every run there."""
@@ -50,13 +50,13 @@ class TableRow:
 
 
 def measure(
-    experiment: Experiment,
+    experiment: AnyExperiment,
     wanted: Sequence[RunCell],
     scenes: Mapping[str, SceneFile],
     folder: Path,
     workers: int,
     recordings: Path | None = None,
-) -> Iterator[tuple[RunCell, dict[str, Any]]]:
+) -> Iterator[tuple[RunCell, JsonObject]]:
     """Run what is not on the disk yet; yields every cell's result as it is known.
 
     Args:
@@ -85,10 +85,10 @@ def measure(
 def _made(
     name: str,
     missing: Sequence[RunCell],
-    trees: Mapping[str, dict[str, Any]],
+    trees: Mapping[str, JsonObject],
     workers: int,
     recordings: Path | None,
-) -> Iterator[tuple[RunCell, dict[str, Any]]]:
+) -> Iterator[tuple[RunCell, JsonObject]]:
     if workers == 1:
         for cell in missing:
             yield cell, _run(name, cell, trees[cell.object], recordings)
@@ -103,7 +103,7 @@ def _made(
             raise
 
 
-def _run(name: str, cell: RunCell, tree: dict[str, Any], recordings: Path | None) -> dict[str, Any]:
+def _run(name: str, cell: RunCell, tree: JsonObject, recordings: Path | None) -> JsonObject:
     scene, station = scene_from_json(tree, "the table"), load_station(station_path("mock"))
     try:
         return table_of(named(name)).run_cell(cell, scene, station, recordings)
@@ -135,7 +135,7 @@ def require_same_keys(folder: Path, assignments: Sequence[str]) -> None:
         write_text_whole(noted, json.dumps(wanted))
 
 
-def measurement_of(experiment: Experiment) -> Measurement:
+def measurement_of(experiment: AnyExperiment) -> AnyMeasurement:
     """How an experiment is measured.
 
     Raises:
@@ -148,7 +148,7 @@ def measurement_of(experiment: Experiment) -> Measurement:
     return experiment.measurement
 
 
-def table_of(experiment: Experiment) -> Measurement:
+def table_of(experiment: AnyExperiment) -> AnyMeasurement:
     """Return what the table of an experiment is measured by: the registry's, or else the experiment's own.
 
     Raises:
@@ -162,7 +162,7 @@ def table_of(experiment: Experiment) -> Measurement:
     return found
 
 
-def rows(experiment: Experiment, results: Results) -> list[TableRow]:
+def rows(experiment: AnyExperiment, results: Mapping[Cell, JsonObject]) -> list[TableRow]:
     """The table of what has been measured so far.
 
     Raises:
@@ -186,7 +186,9 @@ def key_of(cell: RunCell) -> Key:
     return tuple(cell.conditions.items())
 
 
-def by_object(results: Results, condition: Key, value: str = "error_m") -> dict[str, dict[str, float]]:
+def by_object(
+    results: Mapping[Cell, JsonObject], condition: Key, value: str = "error_m"
+) -> dict[str, dict[str, float]]:
     """Mean in metres, the error where nothing else is named, of every method on every object.
 
     Args:
@@ -203,7 +205,9 @@ def by_object(results: Results, condition: Key, value: str = "error_m") -> dict[
     return {name: {m: float(np.mean(e)) for m, e in methods.items()} for name, methods in found.items()}
 
 
-def _row(performed: Results, condition: Key, method: str, measured: Measurement) -> TableRow:
+def _row(
+    performed: Mapping[Cell, JsonObject], condition: Key, method: str, measured: AnyMeasurement
+) -> TableRow:
     found = [
         result["rows"][method]
         for cell, result in performed.items()

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import RecordingDamaged, TouchstoneError
 from harness.basics.files.foreign_file import MOST_DATA, read_bounded
+from harness.basics.files.json_file import JsonObject
 from harness.basics.mesh import Mesh
 from harness.basics.npz_file import read_arrays
 from harness.recording.recording import Recording
@@ -24,7 +24,7 @@ class Truth:
     points: Mapping[int, FloatArray]
     """By step, ``(3,)`` m: the contact on the nominal object."""
 
-    differences: Mapping[str, Any]
+    differences: JsonObject
     """Differences of the mocked world from its model, by name."""
 
     surface: Mesh | None = None

@@ -13,7 +13,7 @@ from harness.bench.device import Health
 from harness.bench.reading import Reading
 from harness.effects.explain import NetworkInUse, networks_at
 from harness.experiment.compare import Comparison
-from harness.experiment.experiment import Experiment, Scored
+from harness.experiment.experiment import AnyExperiment, AnyScored
 from harness.recording.run_folder import RunFiles
 from harness.report import wording
 from harness.report.agreement_part import agreement_part
@@ -53,8 +53,8 @@ class PageSection:
 
 
 def write_run_page(
-    experiment: Experiment,
-    scored: Scored,
+    experiment: AnyExperiment,
+    scored: AnyScored,
     comparison: Comparison,
     health: Mapping[str, Health] | None,
     folder: Path,
@@ -94,7 +94,7 @@ def write_run_page(
 
 def facts_of(
     title: str,
-    scored: Scored,
+    scored: AnyScored,
     comparison: Comparison,
     health: Mapping[str, Health] | None,
     ours: Mapping[str, str] | None = None,
@@ -164,7 +164,7 @@ def effect_rows(comparison: Comparison) -> tuple[EffectRun, ...]:
     return (*ran, *(EffectRun(step.effect.provides, False, step.reason) for step in plan.skipped))
 
 
-def network_rows(scored: Scored) -> tuple[NetworkInUse, ...]:
+def network_rows(scored: AnyScored) -> tuple[NetworkInUse, ...]:
     """The networks that stood for a simulation in an answer; none where the run carries no ObjectFile."""
     if scored.run.scene.object.objectfile is None:
         return ()

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.experiment.answer import common, score
+from harness.experiment.experiment import AnyScored
 from harness.experiment.levels import chosen_levels
 from harness.experiment.lookup import experiment_of
 from harness.recording.recording import Recording
@@ -29,5 +30,5 @@ def answer(run: str | Path, levels: Sequence[str] = ()) -> dict[str, Any]:
     files = RunFiles(Recording(Path(run)))
     experiment = experiment_of(files.recording)
     accuracy = chosen_levels(experiment.knobs, levels, files.network_levels)
-    scored = score(experiment, files, accuracy)
+    scored: AnyScored = score(experiment, files, accuracy)
     return {**common(experiment, scored), **scored.result}

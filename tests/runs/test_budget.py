@@ -88,7 +88,7 @@ def front_of_run(recording: Recording) -> Front:
 
 
 def answered(recording: Recording, target: Target) -> dict[str, Any]:
-    return answer_as_asked(EXPERIMENT, RunFiles(recording), front_of_run(recording), target)
+    return dict(answer_as_asked(EXPERIMENT, RunFiles(recording), front_of_run(recording), target))
 
 
 def test_a_budget_takes_what_keeps_it_and_says_what_it_took(done: Recording, cache: Path) -> None:

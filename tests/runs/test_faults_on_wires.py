@@ -18,7 +18,7 @@ from harness.basics.errors import SafetyStop, TouchstoneError
 from harness.bench.station import Bench
 from harness.cli import invoke
 from harness.experiment import perform
-from harness.experiment.experiment import Experiment
+from harness.experiment.experiment import AnyExperiment
 from harness.experiment.perform import Performed
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
@@ -89,7 +89,7 @@ def resume(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
         failed: dict[str, Any] = {}
 
         def faulty(
-            kind: Experiment, bench: Bench, run: RunFiles, progress: Progress, *others: Any
+            kind: AnyExperiment, bench: Bench, run: RunFiles, progress: Progress, *others: Any
         ) -> Performed:
             try:
                 return perform_on(kind, bench, run, Cued(progress, bench, fault), *others)

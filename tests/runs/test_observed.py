@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.contact_localization.answer import ScoredContact
 from experiments.contact_localization.experiment import EXPERIMENT
 from harness.basics.errors import WrongUse
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import load_station, station_path
 from harness.effects.catalogue import EFFECTS
 from harness.experiment.compare import compare, require_sources
-from harness.experiment.experiment import Scored
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles, station_calibration
 from tests.support.localization import chosen
@@ -50,13 +50,13 @@ def test_some_are_answered_and_some_are_refused() -> None:
 
 
 @pytest.fixture(scope="module")
-def answered(done: Recording) -> Scored:
+def answered(done: Recording) -> ScoredContact:
     return score(done, chosen([]))
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_effect_is_answered_by_a_run_or_refused_before_it_begins(
-    name: str, done: Recording, answered: Scored, tmp_path: Path
+    name: str, done: Recording, answered: ScoredContact, tmp_path: Path
 ) -> None:
     why = refusal(name)
     if why is not None:

@@ -20,6 +20,7 @@ from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy, Setting
 from harness.experiment.answer import WrittenAnswer, add_report, write_answer
 from harness.experiment.begin import begin
+from harness.experiment.experiment import Answering
 from harness.experiment.lookup import named
 from harness.experiment.perform import Performed, perform_on_bench
 from harness.recording import run_folder
@@ -100,7 +101,7 @@ def accuracy_of(name: str) -> Accuracy:
 def test_each_picture_is_inverted_once_and_each_answer_is_solved_once(
     name: str, station: Station, tmp_path: Path, calls: Calls
 ) -> None:
-    experiment, accuracy, written = named(name), accuracy_of(name), list[WrittenAnswer]()
+    experiment, accuracy, written = named(name), accuracy_of(name), list[WrittenAnswer[Answering, object]]()
     run = RunFiles(begin(experiment, scene_of(name), station, 3, None, tmp_path / "run").recording)
 
     def conclude(done: Performed) -> None:
@@ -137,10 +138,11 @@ def answer_recording(name: str, folder: str) -> None:
     from numba.core.event import install_recorder
 
     run = RunFiles(Recording(Path(folder)))
-    answering = named(name).answering(run, accuracy_of(name))
+    experiment = named(name)
+    answering = experiment.answering(run, accuracy_of(name))
     records = run.recording.steps()
     with install_recorder("numba:compiler_lock") as loads:
         for record in records:
             answering.read(record)
-        answering.answer()
+        experiment.estimate(answering)
     assert not loads.buffer, f"{len(loads.buffer)} kernels were loaded"

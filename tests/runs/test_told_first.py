@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from experiments.contact_localization.answer import ContactAnswering
 from experiments.contact_localization.experiment import EXPERIMENT
 from harness.experiment import perform
 from harness.experiment.answer import RESULT, finish
@@ -71,5 +72,5 @@ def test_a_run_is_concluded_while_its_bench_is_open(
         conclude=lambda made: seen.append((made.complete, is_open[-1])),
     )
     assert seen == [(True, True)]
-    assert performed.answering is not None
-    assert len(performed.answering.answer().readings.observations) == 3
+    assert isinstance(performed.answering, ContactAnswering)
+    assert len(EXPERIMENT.estimate(performed.answering).readings.observations) == 3

@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from experiments.contact_localization.answer import ScoredContact
 from experiments.contact_localization.experiment import EXPERIMENT
 from harness.bench.device import Health
 from harness.bench.scene import SceneFile
@@ -12,7 +13,6 @@ from harness.bench.station import Bench
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.experiment import answer, begin, perform
-from harness.experiment.experiment import Scored
 from harness.experiment.perform import Performed
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
@@ -37,7 +37,7 @@ def perform_on_bench(recording: Recording, progress: Progress) -> Performed:
     return perform.perform_on_bench(EXPERIMENT, RunFiles(recording), progress)
 
 
-def score(recording: Recording, accuracy: Accuracy) -> Scored:
+def score(recording: Recording, accuracy: Accuracy) -> ScoredContact:
     """The answer, held against the truth."""
     return answer.score(EXPERIMENT, RunFiles(recording), accuracy)
 
@@ -50,4 +50,4 @@ def finish(
 ) -> dict[str, Any]:
     """The result, with its report."""
     draw = partial(write_run_page, EXPERIMENT)
-    return answer.finish(EXPERIMENT, RunFiles(recording), accuracy, draw, health, folder)
+    return dict(answer.finish(EXPERIMENT, RunFiles(recording), accuracy, draw, health, folder))

@@ -29,6 +29,7 @@ from experiments.contact_localization.model import Prior
 from experiments.contact_localization.plan import plan_contacts
 from experiments.contact_localization.posterior.baselines import mean_random_error
 from experiments.contact_localization.posterior.dials import needs_images
+from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.posterior.policy import Readings
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import TouchstoneError
@@ -160,7 +161,7 @@ class Case:
             self._left[contacts] = run.work({})
         return self._left[contacts]
 
-    def error_of(self, solved: Solved, contacts: int) -> float:
+    def error_of(self, solved: Solved[Estimate], contacts: int) -> float:
         """m, of the last of the first contacts; a refused answer counts as a random one."""
         true = self.true_points[contacts - 1]
         if solved.found is None:

@@ -20,6 +20,7 @@ from experiments.contact_localization.answer import (
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import SPACING, needs_images
+from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.posterior.noise import noise_at
 from experiments.contact_localization.posterior.policy import Readings, read
 from experiments.contact_localization.posterior.search import Search
@@ -94,11 +95,11 @@ class Run:
             return read(self.observations, self.reader, model, self.prior, self.seed)
         return Readings(self.observations, (), model, self.prior, self.seed)
 
-    def solve(self, readings: Readings, setting: Setting) -> Solved:
+    def solve(self, readings: Readings, setting: Setting) -> Solved[Estimate]:
         """Its readings, compared with the object as a setting models it."""
         return solve(readings.under(self.models.at(setting)), setting)
 
-    def described(self, solved: Solved) -> dict[str, Any]:
+    def described(self, solved: Solved[Estimate]) -> dict[str, Any]:
         """The last contact, and how far off it is."""
         position = None if solved.found is None else solved.found.position_in_object
         off = None if position is None or self.true is None else position - self.true

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.accuracy.dials import setting_name
-from experiments.contact_localization.answer import PROGRAM, Answer
+from experiments.contact_localization.answer import PROGRAM, Answer, ScoredContact
 from experiments.contact_localization.answer import Answer as Found
 from experiments.contact_localization.next_contact import EXPECTED
 from experiments.contact_localization.posterior.consistency import Gate
@@ -30,7 +30,6 @@ from harness.basics.geometry import inverse, rotation_from_quaternion, transform
 from harness.bench.device import Health
 from harness.effects.quantities import Quantities
 from harness.experiment.compare import Comparison
-from harness.experiment.experiment import Scored
 from harness.experiment.front import front_at_hand
 from harness.experiment.lookup import named
 from harness.recording.run_folder import RunFiles
@@ -54,12 +53,16 @@ from harness.twin.compare import compare_arm, compare_contact
 from harness.twin.rehearsal import predict_contact
 
 
-def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path) -> Path:
+def write(
+    scored: ScoredContact, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path
+) -> Path:
     """Draw the report; the path of its page."""
     return write_report(report_of(scored, comparison, health), folder)
 
 
-def report_of(scored: Scored, comparison: Comparison, health: Mapping[str, Health] | None) -> ReportData:
+def report_of(
+    scored: ScoredContact, comparison: Comparison, health: Mapping[str, Health] | None
+) -> ReportData:
     """Everything the page shows.
 
     Args:
@@ -92,7 +95,7 @@ def report_of(scored: Scored, comparison: Comparison, health: Mapping[str, Healt
     )
 
 
-def _answer(scored: Scored) -> AnswerRow:
+def _answer(scored: ScoredContact) -> AnswerRow:
     result = scored.result
     touch = result["estimates"][result["answer"]]
     return AnswerRow(
@@ -109,7 +112,7 @@ def _answer(scored: Scored) -> AnswerRow:
 
 
 def _contacts(
-    scored: Scored, comparison: Comparison, history: tuple[Estimate | FitRefused, ...]
+    scored: ScoredContact, comparison: Comparison, history: tuple[Estimate | FitRefused, ...]
 ) -> tuple[ContactRow, ...]:
     count = len(history)
     touch = comparison.evaluation.touch
@@ -182,7 +185,7 @@ def _bench(run: RunFiles, found: Found) -> BenchScene:
 
 
 def _by_contact(
-    scored: Scored, history: tuple[Estimate | FitRefused, ...]
+    scored: ScoredContact, history: tuple[Estimate | FitRefused, ...]
 ) -> tuple[ErrorCurve, ...] | Missing:
     true, found = true_points(scored), scored.found
     if true is None:
@@ -209,7 +212,7 @@ def _curve(sense: Senses, history: tuple[Estimate | FitRefused, ...], true: Floa
     return ErrorCurve(SENSES[sense], tuple(known), tuple(known.values()), by=sense)
 
 
-def _by_seconds(scored: Scored) -> tuple[ErrorCurve, ...] | Missing:
+def _by_seconds(scored: ScoredContact) -> tuple[ErrorCurve, ...] | Missing:
     """Return error and seconds of each sense's answer, and those measured at its levels on other runs."""
     true, run = true_points(scored), scored.run
     if true is None:
@@ -272,7 +275,7 @@ GIVES = ("contact.gel_from_object",)
 """What an answer gives the simulation."""
 
 
-def sources(scored: Scored) -> Quantities:
+def sources(scored: ScoredContact) -> Quantities:
     """Return the answer's part of what the scene's observed quantities are computed from."""
     return {"contact_gel_from_object": inverse(object_from_gels(scored.found))}
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.answer import Answer, ScoredContact
 from experiments.contact_localization.posterior.baselines import mean_random_error, without_images
 from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.dials import SPACING
@@ -15,7 +15,6 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.mesh import Mesh
 from harness.basics.symmetry import SymmetryGroup
-from harness.experiment.experiment import Scored
 
 SAME_PLACE = 3.0e-3
 """Distance of two places modulo the object's symmetry below which they are one, m."""
@@ -27,7 +26,7 @@ _NO_SOUND = "the object's sound is not compared, and touch alone answers"
 _LEFT_OUT = "its picture is left out"
 
 
-def true_points(scored: Scored) -> FloatArray | None:
+def true_points(scored: ScoredContact) -> FloatArray | None:
     """``(contacts, 3)`` metres, None where any is unknown."""
     count = len(scored.found.readings.observations)
     if scored.truth is None or not all(k in scored.truth.points for k in range(count)):
@@ -35,7 +34,7 @@ def true_points(scored: Scored) -> FloatArray | None:
     return np.array([scored.truth.points[k] for k in range(count)])
 
 
-def result_of(scored: Scored) -> dict[str, Any]:
+def result_of(scored: ScoredContact) -> dict[str, Any]:
     """The answer as JSON values; keys carry their unit."""
     found: Answer = scored.found
     true = true_points(scored)
@@ -103,7 +102,7 @@ def further_contact(places: Sequence[FloatArray], symmetry: SymmetryGroup, mesh:
     return "one more contact elsewhere on the object can distinguish them"
 
 
-def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
+def estimate_of(scored: ScoredContact, last: Estimate) -> dict[str, Any]:
     """An estimate by one sense or by both, scored where the truth is known."""
     true = true_points(scored)
     errors = None if true is None else np.linalg.norm(last.contacts - true, axis=1)

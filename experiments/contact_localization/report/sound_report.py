@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import rfft, rfftfreq
 
-from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.answer import Answer, ScoredContact
 from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import true_points
@@ -15,7 +15,6 @@ from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import FitRefused
 from harness.basics.materials import Material
 from harness.bench.acquisition import Strike
-from harness.experiment.experiment import Scored
 from harness.report.data import PeakLine, SenseAnswer, Sound, SpectrogramPair, StrikeLine
 from harness.report.values import Missing, Posterior
 from harness.sim.modal.modes import Modes, dampings
@@ -29,7 +28,7 @@ _EDGE = 0.1
 """Of the greatest force: between its rise to this and its fall to it the hammer touches."""
 
 
-def sound_of(scored: Scored) -> Sound | Missing:
+def sound_of(scored: ScoredContact) -> Sound | Missing:
     """What each sense contributed to a run's answer, or why there is nothing to show."""
     found = scored.found
     if not scored.run.scene.sensors.sound:
@@ -72,7 +71,7 @@ def posterior_of(estimate: Estimate) -> Posterior:
     )
 
 
-def _senses(scored: Scored) -> tuple[SenseAnswer, ...]:
+def _senses(scored: ScoredContact) -> tuple[SenseAnswer, ...]:
     true, answers = true_points(scored), []
     for name, found in scored.found.by_sense.items():
         if isinstance(found, FitRefused):

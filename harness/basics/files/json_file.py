@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -13,6 +13,9 @@ from harness.basics.files.foreign_file import MOST_JSON, read_bounded
 from harness.basics.whole_file import write_text_whole
 
 M = TypeVar("M", bound=BaseModel)
+
+JsonObject: TypeAlias = Mapping[str, Any]
+"""JSON object: the type of a value follows from its key, which no type can state."""
 
 CHECKSUM = "sha256"
 """The key under which a JSON object carries the checksum of its other values."""

@@ -18,7 +18,7 @@ from harness.effects.explain import as_table, left_out, networks_as_table, netwo
 from harness.experiment.answer import Publish, WrittenAnswer, add_report, finish, write_answer
 from harness.experiment.begin import Begun, begin
 from harness.experiment.budget import answer_as_asked, sentences
-from harness.experiment.experiment import Experiment
+from harness.experiment.experiment import Answering, AnyExperiment
 from harness.experiment.front import doubts, foresee, front_for
 from harness.experiment.levels import chosen_levels
 from harness.experiment.lookup import experiment_of, named, require_of
@@ -33,7 +33,7 @@ from harness.report.run_page import write_run_page
 class PlannedRun:
     """A run whose folder is there."""
 
-    experiment: Experiment  #: that it is of.
+    experiment: AnyExperiment  #: that it is of.
     files: RunFiles  #: its folder.
     accuracy: Accuracy  #: of the answer, where no target chooses it.
     target: Target | None  #: a budget or an error that the answer is to keep; None where levels are given.
@@ -51,7 +51,7 @@ class BenchOptions:
 
 
 def new_run(
-    experiment: Experiment,
+    experiment: AnyExperiment,
     scene: SceneOptions,
     bench: BenchOptions,
     levels: Sequence[str],
@@ -141,7 +141,7 @@ def target_of_options(budget: str | None, error: str | None, levels: Sequence[st
     return Target(seconds=value) if budget is not None else Target(error=value)
 
 
-def _describe(experiment: Experiment, begun: Begun, accuracy: Accuracy) -> None:
+def _describe(experiment: AnyExperiment, begun: Begun, accuracy: Accuracy) -> None:
     """What is about to happen, before anything moves; what is simulated, at the levels that were turned."""
     run = RunFiles(begun.recording)
     for line in begun.known.read:
@@ -180,7 +180,11 @@ def perform_and_answer(run: PlannedRun, as_json: bool) -> int:
     Raises:
         TouchstoneError: of the bench, or of the answer; what was recorded is kept.
     """
-    experiment, recording, written = run.experiment, run.files.recording, list[WrittenAnswer]()
+    experiment, recording, written = (
+        run.experiment,
+        run.files.recording,
+        list[WrittenAnswer[Answering, object]](),
+    )
     draw, publish = partial(write_run_page, experiment), publisher(experiment, as_json)
 
     def conclude(done: Performed) -> None:
@@ -213,7 +217,7 @@ def perform_and_answer(run: PlannedRun, as_json: bool) -> int:
         return 0
 
 
-def _cost_of_target(run: PlannedRun) -> dict[str, Any]:
+def _cost_of_target(run: PlannedRun) -> Mapping[str, Any]:
     """The levels that keep the target, and what they cost; doubts and cost are printed."""
     assert run.target is not None
     front = front_for(run.experiment, run.files.scene, run.files.recording.committed)
@@ -248,7 +252,7 @@ def _resuming(run: PlannedRun) -> str:
     return f"touchstone run {run.experiment.name} --resume {run.files.recording.folder}"
 
 
-def publisher(experiment: Experiment, as_json: bool) -> Publish:
+def publisher(experiment: AnyExperiment, as_json: bool) -> Publish:
     """Prints the answer as soon as it is known, before the report is drawn."""
 
     def publish(result: Mapping[str, Any]) -> None:
@@ -262,7 +266,7 @@ def publisher(experiment: Experiment, as_json: bool) -> Publish:
     return publish
 
 
-def show_report(result: dict[str, Any], as_json: bool) -> None:
+def show_report(result: Mapping[str, Any], as_json: bool) -> None:
     """Where the report is; the one object of ``--json``."""
     if as_json:
         emit(result)

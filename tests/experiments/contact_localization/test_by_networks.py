@@ -3,7 +3,7 @@
 import subprocess
 import sys
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -68,7 +68,7 @@ def answered(run: RunFiles, *texts: str) -> tuple[Answer, Accuracy]:
 
 def test_nothing_is_rasterised_where_networks_stand_for_it(run: RunFiles, drawn: list[str]) -> None:
     found, accuracy = answered(run)
-    scored = Scored(run, None, found, None, accuracy, ())
+    scored = Scored(run, cast(Any, None), found, None, accuracy, ())
     comparison = compare(scored, EXPERIMENT.sources(scored))
     assert accuracy["touch.shapes"] == "network"
     assert comparison.notes == ()
@@ -96,7 +96,7 @@ def test_a_run_is_answered_by_the_networks_that_it_carries(
 
 def test_a_pose_that_no_network_answers_is_drawn_and_said(run: RunFiles, drawn: list[str]) -> None:
     found, accuracy = answered(run)
-    scored = Scored(run, None, found, None, accuracy, ())
+    scored = Scored(run, cast(Any, None), found, None, accuracy, ())
     beside = np.eye(4)[None] + 0.0
     comparison = compare(scored, {"contact_gel_from_object": beside})
     assert drawn

@@ -65,7 +65,7 @@ def test_networks_stand_for_every_simulation(run: RunFiles, simulated: list[str]
     answering = ContactAnswering(run, accuracy)
     for record in run.recording.steps():
         answering.read(record)
-    scored = Scored(run, None, answering.answer(), None, accuracy, ())
+    scored = Scored(run, answering, answering.answer(), None, accuracy, ())
     comparison = compare(scored, EXPERIMENT.sources(scored))
     assert simulated == []
     calls = comparison.evaluation.calls

@@ -63,7 +63,7 @@ def went_on(recording: Recording, progress: Quiet) -> bool:
 
 def answered(recording: Recording) -> dict[str, Any]:
     """Its result at the default levels."""
-    return EXPERIMENT.result(score(EXPERIMENT, RunFiles(recording), Accuracy.default(EXPERIMENT.knobs)))
+    return dict(EXPERIMENT.result(score(EXPERIMENT, RunFiles(recording), Accuracy.default(EXPERIMENT.knobs))))
 
 
 def answering_of(recording: Recording) -> ScaleAnswering:

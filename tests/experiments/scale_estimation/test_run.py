@@ -167,7 +167,7 @@ def without_the_object(record: StepRecord) -> StepRecord:
 
 def result_of(answering: ScaleAnswering) -> dict[str, Any]:
     found = answering.answer()
-    return EXPERIMENT.result(Scored(answering.run, answering, found, None, answering.accuracy, ()))
+    return dict(EXPERIMENT.result(Scored(answering.run, answering, found, None, answering.accuracy, ())))
 
 
 def test_where_nothing_is_seen_heard_or_touched_the_answer_is_the_range_and_every_sense_has_a_reason(

@@ -75,15 +75,15 @@ class Answering:
         return Answered(float(self.poses[-1][2, 3]), self.seconds)
 
 
-def result(scored: Scored) -> dict[str, Any]:
+def result(scored: Scored[Answering, Answered]) -> dict[str, Any]:
     """Its height, and how far off it is."""
     truth = scored.truth
     error = None if truth is None else abs(scored.found.value - true_height(scored))
-    sure = {"error_m": error, "credible90_m": CLAIMED}
-    return {"height_m": scored.found.value, **sure, "seconds": scored.found.seconds, "warnings": []}
+    found, sure = scored.found, {"error_m": error, "credible90_m": CLAIMED}
+    return {"height_m": found.value, **sure, "seconds": found.seconds, "warnings": []}
 
 
-def true_height(scored: Scored) -> float:
+def true_height(scored: Scored[Answering, Answered]) -> float:
     """m in base, of the last true contact."""
     assert scored.truth is not None
     run, last = scored.run, max(scored.truth.points)
@@ -96,7 +96,7 @@ def lines(result: Mapping[str, Any]) -> list[str]:
     return [f"toy: touched at {1e3 * result['height_m']:.0f} mm"]
 
 
-def sources(scored: Scored) -> Quantities:
+def sources(scored: Scored[Answering, Answered]) -> Quantities:
     """Where the gel was."""
     run, gels = scored.run, np.array(scored.answering.poses)
     return {"contact_gel_from_object": inverse(gels) @ run.scene.base_from_object(run.mesh)}
@@ -111,6 +111,7 @@ EXPERIMENT = Experiment(
     plan=plan,
     performer=performer,
     answering=Answering,
+    estimate=Answering.answer,
     result=result,
     lines=lines,
     sources=sources,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.accuracy.dials import KNOBS
-from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.answer import Answer, ScoredContact
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.consistency import Gate
@@ -56,14 +56,14 @@ def found(contacts: tuple[Contact, ...], block: Model, prior: Prior) -> Answer:
     return answered(contacts, block, prior)
 
 
-def scored(found: Answer, symmetry: SymmetryGroup, truth: Truth | None) -> Scored:
+def scored(found: Answer, symmetry: SymmetryGroup, truth: Truth | None) -> ScoredContact:
     """Only what the estimate by touch is made from."""
     nothing = cast(Any, None)
-    answering = SimpleNamespace(symmetry=symmetry)
+    answering = cast(Any, SimpleNamespace(symmetry=symmetry))
     return Scored(nothing, answering, found, truth, Accuracy.default(KNOBS), ())
 
 
-def as_written(one: Scored) -> dict[str, Any]:
+def as_written(one: ScoredContact) -> dict[str, Any]:
     return estimate_of(one, one.found.last)
 
 

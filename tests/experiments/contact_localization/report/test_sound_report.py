@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.contact_localization.accuracy.dials import KNOBS
-from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.answer import Answer, ScoredContact
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import locate
@@ -53,7 +53,7 @@ def model() -> Model:
     return Model(mesh, GELSIGHT_R15, calibration, MODES, MATERIALS["glass"])
 
 
-def scored(model: Model, strikes: tuple[Strike | None, ...], asked: bool = True) -> Scored:
+def scored(model: Model, strikes: tuple[Strike | None, ...], asked: bool = True) -> ScoredContact:
     """By touch the plate was refused, by sound it was not."""
     facing = frame_facing(np.array([0.0, 0.0, -1.0]), 0.3)
     poses = [BASE_FROM_OBJECT @ transform(facing, point) for point in POINTS]
