@@ -9,7 +9,6 @@ from typing import TypeAlias
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.dials import SIMULATED, accuracy_at, needs_sound
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import (
@@ -26,6 +25,7 @@ from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.noise import noise_at
 from experiments.contact_localization.posterior.policy import Readings, estimate_contacts, read
 from experiments.contact_localization.section import Localization
+from experiments.contact_localization.settings import SIMULATED, accuracy_at, needs_sound
 from experiments.contact_localization.touch.touch import contact_of
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused, MeshRefused, WrongUse

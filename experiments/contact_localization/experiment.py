@@ -3,7 +3,6 @@
 from functools import partial
 
 from experiments.contact_localization.accuracy.budget import BUDGETS
-from experiments.contact_localization.accuracy.dials import KNOBS
 from experiments.contact_localization.accuracy.table import MEASUREMENT
 from experiments.contact_localization.answer import PROGRAM, ContactAnswering
 from experiments.contact_localization.next_contact import ContactChooser
@@ -11,6 +10,7 @@ from experiments.contact_localization.plan import plan
 from experiments.contact_localization.report.report import GIVES, sources, write
 from experiments.contact_localization.report.result import answer_lines, result_of
 from experiments.contact_localization.section import Localization
+from experiments.contact_localization.settings import KNOBS
 from harness.bench.station import Bench
 from harness.experiment.experiment import Experiment, Helpers
 from harness.recording.run_folder import RunFiles

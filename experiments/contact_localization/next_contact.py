@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.dials import KNOBS
 from experiments.contact_localization.answer import ContactAnswering
 from experiments.contact_localization.model import Prior
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
 from experiments.contact_localization.posterior.posterior import thinned
 from experiments.contact_localization.section import Localization
+from experiments.contact_localization.settings import KNOBS
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import FitRefused, MotionRefused, WrongUse
 from harness.basics.faces.ray_mesh import RayMesh

@@ -9,7 +9,7 @@ the networks of cells, with an occupancy grid; samples where nothing is occupied
 
 from collections.abc import Mapping
 from dataclasses import asdict, astuple, dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
@@ -26,6 +26,7 @@ from experiments.paper.rendering import (
     Sense,
     picture_scores,
     stored_graph,
+    train_network,
 )
 from harness.authoring.vision.data import HeldOutViews, held_out_pictures
 from harness.authoring.vision.metrics import BEHIND, reference_pictures
@@ -297,11 +298,7 @@ def _white() -> MadeMethod:
 
 
 def _by_field(bench: ViewBench, work: RenderingWork) -> MadeMethod:
-    def train() -> bytes:
-        from experiments.paper.rendering_training import train_field
-
-        return train_field(bench, FIELD, work.report)
-
+    train = partial(train_network, "train_field", bench, FIELD, work.report)
     identity = ("field", bench.identity, astuple(FIELD))
     data, seconds = stored_graph(work.store, identity, "the field of 1.0", train)
     field = opened_field(data, bench.lit.appearance.mesh, FIELD.samples)

@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from harness.authoring.training import Report
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.store import Store, digest
+from harness.bench.experiments import loaded
 from harness.picture.image_metrics import mean_square, ssim
 
 Sense = Literal["vision", "audio", "touch"]
@@ -106,6 +107,12 @@ GRAPH_VERSION = "baseline graph"
 
 class TorchMissing(Exception):
     """A baseline has to be trained, and torch is not installed; its row of the table says so."""
+
+
+def train_network(function: str, *arguments: object) -> bytes:
+    """Train a network by a function of ``rendering_training``, which needs torch and is imported on use."""
+    trained: bytes = loaded(f"experiments.paper.rendering_training:{function}")(*arguments)
+    return trained
 
 
 def stored_graph(

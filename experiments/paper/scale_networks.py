@@ -8,6 +8,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import cv2
 import numpy as np
@@ -19,6 +20,16 @@ from harness.basics.arrays import BoolArray, ByteArray, FloatArray
 from harness.basics.errors import DataRefused, FitRefused
 from harness.objectfile.entries import Tensor
 from harness.objectfile.runtime import Network
+
+
+@dataclass(frozen=True)
+class SizeAmounts:
+    """Training set sizes and epochs of the networks that estimate scale."""
+
+    shapes: int  #: of the families, a tenth of them held out.
+    samples: MappingProxyType[str, int]  #: draws of each shape, by sense.
+    epochs: MappingProxyType[str, int]  #: by sense.
+
 
 SIDE = 64
 """Pixels along each side of a crop."""

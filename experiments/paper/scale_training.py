@@ -10,9 +10,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from experiments.paper.scale_networks import FRAMES, HOP, LINES, SIDE, SIZE_INPUTS, STEPS, WINDOW
+from experiments.paper.scale_networks import FRAMES, HOP, LINES, SIDE, SIZE_INPUTS, STEPS, WINDOW, SizeAmounts
 from experiments.paper.scale_samples import PAPER_MAKERS
-from experiments.paper.train import SizeAmounts
 from experiments.scale_estimation.unseen import contact_set
 from experiments.scale_estimation.unseen.training.samples import SIZES, SizeSamples, gathered
 from experiments.scale_estimation.unseen.training.train_network import HELD_OUT, size_errors

@@ -9,7 +9,7 @@ or behind two seconds cannot be in it.
 import time
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
@@ -25,6 +25,7 @@ from experiments.paper.rendering import (
     RenderingWork,
     Sense,
     stored_graph,
+    train_network,
 )
 from harness.authoring.audio.audio import opened, waves_graph
 from harness.authoring.audio.data import SoundSamples, Split, canonical, split_nodes, wave_number
@@ -304,11 +305,7 @@ def _by_waves(bench: StrikeBench, spec: WavesSpec) -> MadeMethod:
 
 
 def _by_audionet(bench: StrikeBench, work: RenderingWork) -> MadeMethod:
-    def train() -> bytes:
-        from experiments.paper.rendering_training import train_audionet
-
-        return train_audionet(bench, AUDIONET, work.report)
-
+    train = partial(train_network, "train_audionet", bench, AUDIONET, work.report)
     identity = ("audionet", bench.lesson, astuple(AUDIONET), AUDIONET_EPOCHS)
     data, seconds = stored_graph(work.store, identity, "AudioNet", train)
     points, gains = network_tensors(len(bench.modes.frequencies), ANYWHERE)
@@ -325,11 +322,7 @@ def _by_gains(bench: StrikeBench, network: Network) -> Render:
 
 
 def _by_spectrogram(bench: StrikeBench, work: RenderingWork) -> MadeMethod:
-    def train() -> bytes:
-        from experiments.paper.rendering_training import train_spectrogram
-
-        return train_spectrogram(bench, SPECTROGRAM, work.report)
-
+    train = partial(train_network, "train_spectrogram", bench, SPECTROGRAM, work.report)
     identity = ("spectrogram", bench.lesson, astuple(SPECTROGRAM))
     data, seconds = stored_graph(work.store, identity, "the spectrogram network", train)
     place, spectrum = spectrum_pair()

@@ -8,7 +8,7 @@ are the sensor's of all rows of the table.
 import time
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final, Literal, Self
 
 import numpy as np
@@ -23,6 +23,7 @@ from experiments.paper.rendering import (
     Sense,
     picture_scores,
     stored_graph,
+    train_network,
 )
 from harness.authoring.touch.data import (
     DEPTHS,
@@ -343,11 +344,7 @@ def _by_codes(bench: TouchBench, spec: CodesSpec) -> MadeMethod:
 
 
 def _by_touchnet(bench: TouchBench, work: RenderingWork) -> MadeMethod:
-    def train() -> bytes:
-        from experiments.paper.rendering_training import train_touchnet
-
-        return train_touchnet(bench, TOUCHNET, work.report)
-
+    train = partial(train_network, "train_touchnet", bench, TOUCHNET, work.report)
     identity = ("touchnet", bench.lesson, astuple(TOUCHNET), TOUCHNET_PRESSES)
     data, seconds = stored_graph(work.store, identity, "TouchNet", train)
     pixel, depth = touchnet_pair()
@@ -362,11 +359,7 @@ def _by_touchnet(bench: TouchBench, work: RenderingWork) -> MadeMethod:
 
 
 def _by_colours(bench: TouchBench, work: RenderingWork) -> MadeMethod:
-    def train() -> bytes:
-        from experiments.paper.rendering_training import train_colours
-
-        return train_colours(bench, COLOURS, work.report)
-
+    train = partial(train_network, "train_colours", bench, COLOURS, work.report)
     places = bench.places
     identity = ("colours", bench.lesson, astuple(COLOURS))
     data, seconds = stored_graph(work.store, identity, "the tactile network of 1.0", train)

@@ -12,11 +12,10 @@ pcn=FOLDER``). The latter wants a graphics processor: there seven minutes, witho
 
 import argparse
 import sys
-from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 
-from experiments.paper.scale_networks import SIZE_INPUTS
+from experiments.paper.scale_networks import SIZE_INPUTS, SizeAmounts
 from experiments.paper.shape_network import INPUTS as COMPLETION_INPUTS
 from experiments.shape_reconstruction.prior.samples import CompletionProfile
 from harness.authoring.network_program import (
@@ -30,16 +29,6 @@ from harness.authoring.network_program import (
 )
 from harness.authoring.profiles import find_profile
 from harness.basics.errors import WrongUse
-
-
-@dataclass(frozen=True)
-class SizeAmounts:
-    """Training set sizes and epochs of the networks that estimate scale."""
-
-    shapes: int  #: of the families, a tenth of them held out.
-    samples: MappingProxyType[str, int]  #: draws of each shape, by sense.
-    epochs: MappingProxyType[str, int]  #: by sense.
-
 
 SIZE_AMOUNTS = MappingProxyType(
     {

@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.accuracy.benchmark_runs import Case, Cell, cells, performed
-from experiments.contact_localization.accuracy.dials import needs_sound
 from experiments.contact_localization.answer import ESTIMATOR, PROGRAM, Models
 from experiments.contact_localization.experiment import EXPERIMENT
+from experiments.contact_localization.settings import needs_sound
 from harness.basics.whole_file import write_text_whole
 from harness.bench.station_file import load_station, station_path
 from harness.cost.choice import for_budget

@@ -13,7 +13,7 @@ from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.plan import plan_contacts
 from experiments.contact_localization.posterior.dials import Senses
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.sound.consistency import doubts_of_sound
+from experiments.contact_localization.posterior.strike_consistency import doubts_of_sound
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused
 from harness.bench.acquisition import Strike

@@ -9,15 +9,15 @@ import pytest
 
 from experiments.contact_localization.accuracy.benchmark_runs import Case, cells
 from experiments.contact_localization.accuracy.budget import shipped_curve
-from experiments.contact_localization.accuracy.dials import (
+from experiments.contact_localization.answer import ESTIMATOR, PROGRAM
+from experiments.contact_localization.experiment import EXPERIMENT
+from experiments.contact_localization.posterior.dials import METHOD, SPACING
+from experiments.contact_localization.settings import (
     FINEST,
     KNOBS,
     setting_name,
     settings,
 )
-from experiments.contact_localization.answer import ESTIMATOR, PROGRAM
-from experiments.contact_localization.experiment import EXPERIMENT
-from experiments.contact_localization.posterior.dials import METHOD, SPACING
 from experiments.scale_estimation.experiment import EXPERIMENT as SCALE
 from experiments.shape_reconstruction.experiment import EXPERIMENT as SHAPE
 from harness.basics.errors import WrongUse

@@ -34,7 +34,7 @@ OF_SOUND = (
     "experiments.contact_localization.sound.gains",
     "experiments.contact_localization.sound.likelihood",
     "experiments.contact_localization.posterior.baselines",
-    "experiments.contact_localization.sound.evidence",
+    "experiments.contact_localization.posterior.strikes",
     "harness.strikes.spectra",
     "mocks.daq.strike_counts",
     "mocks.world.instrument",

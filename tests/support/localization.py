@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from experiments.contact_localization.accuracy.dials import KNOBS
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.posterior.policy import estimate_contacts, read
+from experiments.contact_localization.settings import KNOBS
 from harness.effects.accuracy import Accuracy, Level
 from harness.experiment.answer import score
 from harness.experiment.levels import chosen_levels

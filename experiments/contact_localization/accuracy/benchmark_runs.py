@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.accuracy.budget import Run
-from experiments.contact_localization.accuracy.dials import HEARD
 from experiments.contact_localization.answer import (
     PROGRAM,
     Models,
@@ -31,6 +30,7 @@ from experiments.contact_localization.posterior.baselines import mean_random_err
 from experiments.contact_localization.posterior.dials import needs_images
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.posterior.policy import Readings
+from experiments.contact_localization.settings import HEARD
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import TouchstoneError
 from harness.basics.geometry import rotation_about

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.dials import FINEST, SIMULATED, needs_sound
 from experiments.contact_localization.answer import (
     Models,
     load_kernels,
@@ -25,6 +24,7 @@ from experiments.contact_localization.posterior.noise import noise_at
 from experiments.contact_localization.posterior.policy import Readings, read
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.section import Localization
+from experiments.contact_localization.settings import FINEST, SIMULATED, needs_sound
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray
 from harness.bench.scene import SceneFile

@@ -14,12 +14,6 @@ from experiments.contact_localization.accuracy.benchmark_runs import (
     performed,
     preparations,
 )
-from experiments.contact_localization.accuracy.dials import (
-    accuracy_at,
-    setting_name,
-    settings,
-    settings_by_count,
-)
 from experiments.contact_localization.answer import ESTIMATOR, solve
 from experiments.contact_localization.posterior.baselines import (
     MfccTable,
@@ -32,7 +26,12 @@ from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.posterior.noise import noise_at
 from experiments.contact_localization.posterior.policy import Readings
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.report.result import fit_of
+from experiments.contact_localization.settings import (
+    accuracy_at,
+    setting_name,
+    settings,
+    settings_by_count,
+)
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
@@ -144,7 +143,7 @@ def _estimated(
         "credible90_m": found.credible90,
         "modes": len(found.modes),
         "error_top10_m": float(np.linalg.norm(found.candidates - true, axis=1).mean()),
-        "fits_nats": [fit_of(gate) for gate in found.gates],
+        "fits_nats": [gate.finite_fit for gate in found.gates],
     }
 
 

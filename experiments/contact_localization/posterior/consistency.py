@@ -47,6 +47,11 @@ class Gate:
     """index of an earlier contact at the same place and attitude, or None; such presses together count
     once."""
 
+    @property
+    def finite_fit(self) -> float | None:
+        """The fit as JSON has it; None without one, or if the contact fits nowhere near."""
+        return self.fit if self.fit is not None and np.isfinite(self.fit) else None
+
 
 @dataclass(frozen=True)
 class Likeness:

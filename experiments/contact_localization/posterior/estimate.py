@@ -37,11 +37,11 @@ from experiments.contact_localization.posterior.posterior import (
     settled,
 )
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.sound.consistency import (
+from experiments.contact_localization.posterior.strike_consistency import (
     distinct_strikes,
     judge_sound,
 )
-from experiments.contact_localization.sound.evidence import StrikeEvidence, by_sound, hear
+from experiments.contact_localization.posterior.strikes import StrikeEvidence, by_sound, hear
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import FitRefused, WrongUse

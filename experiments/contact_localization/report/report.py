@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.dials import setting_name
 from experiments.contact_localization.answer import PROGRAM, Answer, ScoredContact
 from experiments.contact_localization.answer import Answer as Found
 from experiments.contact_localization.next_contact import EXPECTED
@@ -24,6 +23,7 @@ from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import by_translations, flags_of, true_points
 from experiments.contact_localization.report.sound_report import posterior_of, sound_of
 from experiments.contact_localization.section import Localization
+from experiments.contact_localization.settings import setting_name
 from harness.basics.arrays import AnyArray, FloatArray, read_only
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import inverse, rotation_from_quaternion, transform, translation

@@ -10,7 +10,7 @@ from experiments.contact_localization.posterior.baselines import mean_random_err
 from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.sound.consistency import doubts_of_sound
+from experiments.contact_localization.posterior.strike_consistency import doubts_of_sound
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.mesh import Mesh
@@ -133,7 +133,7 @@ def estimate_of(scored: ScoredContact, last: Estimate) -> dict[str, Any]:
                 "contact": k + 1,
                 "position_m": point.tolist(),
                 "error_m": None if errors is None else float(errors[k]),
-                "fit_nats": fit_of(last.gates[k]) if last.gates else None,
+                "fit_nats": last.gates[k].finite_fit if last.gates else None,
                 "flags": flags_of(last.gates[k], gels[k].refusal) if last.gates else [],
             }
             for k, point in enumerate(last.contacts)
@@ -160,11 +160,6 @@ def flags_of(gate: Gate, refusal: str = "") -> list[str]:
     if gate.repeats is not None:
         said.append(f"repeated: the same place as contact {gate.repeats + 1}; together they count once")
     return said
-
-
-def fit_of(gate: Gate) -> float | None:
-    """Nats; None where there is no image or, as JSON has no infinity, where the contact fits nowhere near."""
-    return gate.fit if gate.fit is not None and np.isfinite(gate.fit) else None
 
 
 def answer_lines(result: Mapping[str, Any]) -> list[str]:

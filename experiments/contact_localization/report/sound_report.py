@@ -9,8 +9,8 @@ from scipy.fft import rfft, rfftfreq
 from experiments.contact_localization.answer import Answer, ScoredContact
 from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import Estimate
+from experiments.contact_localization.posterior.strikes import StrikeEvidence, hear
 from experiments.contact_localization.report.result import true_points
-from experiments.contact_localization.sound.evidence import StrikeEvidence, hear
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import FitRefused
 from harness.basics.materials import Material

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.accuracy.budget import Run
-from experiments.contact_localization.accuracy.dials import (
-    needs_sound,
-    setting_name,
-)
 from experiments.contact_localization.answer import Models, solve
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import SENSES, SPACING, needs_images
 from experiments.contact_localization.posterior.policy import read
+from experiments.contact_localization.settings import (
+    needs_sound,
+    setting_name,
+)
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import frame_facing, transform
 from harness.basics.materials import Material

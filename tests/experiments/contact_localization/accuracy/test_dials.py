@@ -3,13 +3,6 @@
 import pytest
 
 from experiments.contact_localization.accuracy.budget import shipped_curve
-from experiments.contact_localization.accuracy.dials import (
-    FINEST,
-    KNOBS,
-    needs_sound,
-    settings,
-    settings_by_count,
-)
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.posterior.dials import (
     BLOCK,
@@ -19,6 +12,13 @@ from experiments.contact_localization.posterior.dials import (
     SAMPLES,
     SENSES,
     SPACING,
+)
+from experiments.contact_localization.settings import (
+    FINEST,
+    KNOBS,
+    needs_sound,
+    settings,
+    settings_by_count,
 )
 from harness.basics.errors import WrongUse
 from harness.effects.accuracy import Accuracy, Knob, Level

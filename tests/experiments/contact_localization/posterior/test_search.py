@@ -12,7 +12,7 @@ from experiments.contact_localization.posterior.estimate import SOUND_LEFT_OUT, 
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
 from experiments.contact_localization.posterior.noise import Noise, SharedNoise
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.sound.evidence import StrikeEvidence
+from experiments.contact_localization.posterior.strikes import StrikeEvidence
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.nearest import nearest_point

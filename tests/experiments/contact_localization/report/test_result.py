@@ -9,7 +9,6 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.dials import KNOBS
 from experiments.contact_localization.answer import Answer, ScoredContact
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
@@ -18,6 +17,7 @@ from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.policy import Readings
 from experiments.contact_localization.report.result import estimate_of, flags_of
+from experiments.contact_localization.settings import KNOBS
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.errors import RecordingDamaged
 from harness.basics.geometry import translation

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.contact_localization.accuracy.dials import KNOBS
 from experiments.contact_localization.answer import Answer, ScoredContact
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.dials import SPACING
@@ -17,6 +16,7 @@ from experiments.contact_localization.posterior.estimate import locate
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.policy import Readings
 from experiments.contact_localization.report.sound_report import contact_time, sound_of, strike_line
+from experiments.contact_localization.settings import KNOBS
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import frame_facing, transform

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.sound.consistency import (
+from experiments.contact_localization.posterior.strike_consistency import (
     REFUSE_BELOW,
     REFUSE_UNHEARD_BELOW,
     SoundFit,

@@ -11,8 +11,7 @@ from experiments.contact_localization.posterior.hypotheses import Hypotheses, an
 from experiments.contact_localization.posterior.noise import Noise
 from experiments.contact_localization.posterior.posterior import best_point
 from experiments.contact_localization.posterior.search import MOST_HYPOTHESES, Search
-from experiments.contact_localization.report.sound_report import sound_pair, spectrogram
-from experiments.contact_localization.sound.evidence import (
+from experiments.contact_localization.posterior.strikes import (
     ANCHORS,
     StrikeEvidence,
     by_sound,
@@ -20,6 +19,7 @@ from experiments.contact_localization.sound.evidence import (
     sound_nats,
     strike_places,
 )
+from experiments.contact_localization.report.sound_report import sound_pair, spectrogram
 from experiments.contact_localization.sound.gains import gain_table
 from experiments.contact_localization.sound.likelihood import SoundNoise, SoundTerm
 from experiments.contact_localization.touch.touch import Contact

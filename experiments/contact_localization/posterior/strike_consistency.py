@@ -9,7 +9,7 @@ from experiments.contact_localization.posterior.hypotheses import Hypotheses, an
 from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores
 from experiments.contact_localization.posterior.noise import SAME_AXIS, SAME_PLACE
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.sound.evidence import ANCHORS, StrikeEvidence, strike_places
+from experiments.contact_localization.posterior.strikes import ANCHORS, StrikeEvidence, strike_places
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import FitRefused
 from harness.bench.acquisition import Strike
