@@ -87,7 +87,7 @@ def done(station: Station, tmp_path_factory: pytest.TempPathFactory) -> Done:
     run = RunFiles(recording)
     with open_station(run.station, run.scene, run.context) as bench:
         checked = check_bench(bench)
-        performed = perform_on(replace(EXPERIMENT, performer=performer), bench, recording, Quiet())
+        performed = perform_on(replace(EXPERIMENT, performer=performer), bench, run, Quiet())
         assert bench.lab is not None
         bench.lab.fault("thermometer", "unplug")
         with pytest.raises(BenchFault) as gone:
