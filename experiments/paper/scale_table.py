@@ -95,7 +95,7 @@ def run_cell(
     networks = {} if stated is None else paper_networks(Path(stated))
     here = scene_of(scene, cell)
     with closing(perform_in_process(experiment, cell, here, station, recordings)) as case:
-        recording = case.run.recording
+        recording = case.run.files.recording
         truth = read_truth(recording)
         if truth is None:
             raise DataRefused("no instrument read anything in this run: no way to the object was free")

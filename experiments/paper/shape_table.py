@@ -154,7 +154,7 @@ def run_cell(
     networks = [] if asked.pcn is None else paper_completions(Path(asked.pcn))
     shapes, left_out = ([], []) if asked.library is None else library_of(Path(asked.library))
     with closing(perform_in_process(experiment, cell, here, station, recordings)) as case:
-        run = RunFiles(case.run.recording)
+        run = RunFiles(case.run.files.recording)
         truth = true_surface(run, read_truth(run.recording))
         if truth is None:
             raise DataRefused(

@@ -154,7 +154,8 @@ class ScaleAnswering:
         seen = run.observe(record)
         if seen.strike is not None:
             self.strikes.append(seen.strike)
-            began = self._count("audio", began)
+            self._count("audio", began)
+        began = time.perf_counter() - run.gel_reader.read(seen.images).seconds[1]
         try:
             patch = patch_of_contact(seen, run.gel_reader, run.station.gel.sensor.pitch)
         except PictureRefused as refusal:  # whether the gel met anything is not known either
@@ -168,11 +169,9 @@ class ScaleAnswering:
         self.free.append(free_line(seen.base_from_gel, length, patch is not None))
         self._count("touch", began)
 
-    def _count(self, sense: str, began: float) -> float:
-        """The time; what has passed since ``began`` was for that sense."""
-        ended = time.perf_counter()
-        self._read[sense] += ended - began
-        return ended
+    def _count(self, sense: str, began: float) -> None:
+        """Add the time since ``began`` to the seconds of a sense."""
+        self._read[sense] += time.perf_counter() - began
 
     def answer(self) -> SizeAnswer:
         """By each sense that the scene asks for, and by all that answer.

@@ -37,6 +37,7 @@ from harness.bench.station_file import Station
 from harness.experiment.experiment import ErrorBound, Helpers, Planned
 from harness.experiment.levels import chosen_levels
 from harness.picture.outline import SeenOutline
+from harness.recording.observation import observe_step
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import Step, StepRecord
@@ -195,7 +196,7 @@ class Explorer:
         """What a contact touched, and ``(3, 3)`` the gel's turn in base."""
         run = self._run
         record = StepRecord(step, {reading.channel.name: reading for reading in read}, 0.0)
-        seen = run.observe(record)
+        seen = observe_step(record, run.station.flange_from_gel, aspect=run.aspect)
         patch = None
         with suppress(PictureRefused):  # the answer names it
             patch = patch_of_contact(seen, run.gel_reader, run.station.gel.sensor.pitch)

@@ -31,8 +31,8 @@ from harness.experiment.lookup import named
 from harness.experiment.solving import Budgets, Solved
 from harness.experiment.subjects import object_key
 from harness.experiment.truth import read_truth
-from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
+from harness.recording.step_file import StepRecord
 
 DEFAULT = "default"
 """The method, and the setting, of every dial at its default."""
@@ -67,18 +67,22 @@ class PlainCell:
 
 @dataclass(frozen=True, eq=False)
 class PlainRun:
-    """A recorded run, to be answered at any setting of the dials; settings share nothing."""
+    """A recorded run, to be answered at any setting of the knobs; settings share the inverted pictures."""
 
-    experiment: AnyExperiment  #: that it is of.
-    recording: Recording  #: of it.
-    steps: int  #: from how many of its first steps.
-    shared: tuple[float, float] = (0.0, 0.0)
+    experiment: AnyExperiment  #: the experiment of the run.
+    files: RunFiles  #: folder of the run.
+    steps: int  #: number of its first steps that are used.
+    shared: tuple[float, float] = (0.0, 0.0)  #: CPU and wall time in s that reading the pictures took.
 
     @property
     def object(self) -> str:
         """The name that its seconds are measured under."""
-        run = RunFiles(self.recording)
-        return object_key(run.scene.object.name, run.mesh)
+        return object_key(self.files.scene.object.name, self.files.mesh)
+
+    @property
+    def records(self) -> list[StepRecord]:
+        """The steps that are used."""
+        return [record for record in self.files.recording.steps() if record.step.index < self.steps]
 
     def unfit(self, _setting: Setting) -> None:
         """It can be answered at every setting."""
@@ -100,33 +104,26 @@ class PlainRun:
         return float(self.steps)
 
     def read(self, _setting: Setting) -> "PlainRun":
-        """Itself: each answer reads its steps."""
-        return self
+        """Invert the pictures that were not inverted yet."""
+        seen = [self.files.observe(record) for record in self.records if "gel.image" in record.readings]
+        seconds = [self.files.gel_reader.read(one.images).seconds for one in seen]
+        return replace(self, shared=(sum(cpu for cpu, _ in seconds), sum(wall for _, wall in seconds)))
 
     def result(self, setting: Setting) -> JsonObject:
-        """The answer as JSON values.
+        """Return the answer as JSON values.
 
         Raises:
             FitRefused: nothing explains the readings.
         """
-        return self.accepted(setting)[1]
-
-    def accepted(self, setting: Setting) -> tuple[Solved[JsonObject], JsonObject]:
-        """Answer at a setting; the answer as JSON values once more.
-
-        Raises:
-            FitRefused: nothing explains the readings.
-        """
-        solved = self.solve(self, setting)
+        solved = self.solve(self.read(setting), setting)
         if solved.found is None:
             raise FitRefused(solved.refusal)
-        return solved, solved.found
+        return solved.found
 
     def solve(self, _readings: "PlainRun", setting: Setting) -> Solved[JsonObject]:
-        """The answer as JSON values, timed from the first reading on."""
-        run, accuracy, answering = self._answering(setting)
-        records = [record for record in self.recording.steps() if record.step.index < self.steps]
-        answer, refusal = None, None
+        """Compute the answer as JSON values, timed from the inverted pictures on."""
+        accuracy, answering = self._answering(setting)
+        records, answer, refusal = self.records, None, None
         cpu, wall = time.process_time(), time.perf_counter()
         try:
             for record in records:
@@ -137,16 +134,15 @@ class PlainRun:
         cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
         if refusal is not None:
             return Solved(None, None, cpu, wall, refusal)
-        truth = read_truth(self.recording)
+        truth = read_truth(self.files.recording)
         if truth is not None:
             truth = replace(truth, points={k: v for k, v in truth.points.items() if k < self.steps})
-        result = self.experiment.result(Scored(run, answering, answer, truth, accuracy, ()))
+        result = self.experiment.result(Scored(self.files, answering, answer, truth, accuracy, ()))
         return Solved(result, result.get("credible90_m"), cpu, wall)
 
-    def _answering(self, setting: Setting) -> tuple[RunFiles, Accuracy, Answering]:
-        run = RunFiles(self.recording)
-        accuracy = chosen_levels(self.experiment.knobs, (), run.network_levels).with_(setting)
-        return run, accuracy, self.experiment.answering(run, accuracy)
+    def _answering(self, setting: Setting) -> tuple[Accuracy, Answering]:
+        accuracy = chosen_levels(self.experiment.knobs, (), self.files.network_levels).with_(setting)
+        return accuracy, self.experiment.answering(self.files, accuracy)
 
     def described(self, solved: Solved[JsonObject]) -> JsonObject:
         """Where its answer is a place, that; its error."""
@@ -178,10 +174,12 @@ class PlainCase:
 
     def sample(self, setting: Setting, steps: int) -> Sample:
         """The error and the seconds of an answer from the first steps."""
-        run = replace(self.run, steps=steps)
-        (solved, found), work = run.accepted(setting), run.work(setting)
-        error, radius = found["error_m"], solved.radius
-        return Sample(self.cell.name, run.object, error, radius, 0.0, solved.cpu, solved.wall, work)
+        run = replace(self.run, steps=steps).read(setting)
+        solved, work = run.solve(run, setting), run.work(setting)
+        if solved.found is None:
+            raise FitRefused(solved.refusal)
+        numbers = run.shared[0], solved.cpu, solved.wall, work
+        return Sample(self.cell.name, run.object, solved.found["error_m"], solved.radius, *numbers)
 
 
 Cell = TypeVar("Cell", bound=RunCell)
@@ -270,7 +268,7 @@ def plain_budgets(
     """
 
     def solver(run: RunFiles) -> PlainRun:
-        return PlainRun(named(name), run.recording, run.recording.committed)
+        return PlainRun(named(name), run, run.recording.committed)
 
     def unfit(_scene: SceneFile, setting: Setting) -> str | None:
         """Return why a setting of a stored curve cannot be answered; None if it can."""
@@ -302,7 +300,7 @@ def perform_in_process(
     """
     if recordings is not None:
         recording = recorded(experiment, cell, scene, station, recordings)
-        return PlainCase(cell, PlainRun(experiment, recording, recording.committed))
+        return PlainCase(cell, PlainRun(experiment, RunFiles(recording), recording.committed))
     aside = TemporaryDirectory(prefix="touchstone-case-")
     recording = performed(experiment, cell, scene, station, Path(aside.name) / "run")
-    return PlainCase(cell, PlainRun(experiment, recording, recording.committed), aside)
+    return PlainCase(cell, PlainRun(experiment, RunFiles(recording), recording.committed), aside)

@@ -176,6 +176,7 @@ class RunFiles:
     """A recording with what it carries, read on first use and checked against the hashes in ``run.json``."""
 
     recording: Recording
+    _observed: dict[int, Observation] = field(default_factory=dict, init=False, repr=False)
     _silhouettes: dict[int, BoolArray | None] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
@@ -233,13 +234,21 @@ class RunFiles:
         return GelReader(self.calibration)
 
     def observe(self, record: StepRecord) -> Observation:
-        """Return one contact as it was recorded.
+        """Return one committed contact as it was recorded; it is computed on first use.
 
         Raises:
             RecordingDamaged: the step has no images, or no pose of the arm with them.
         """
-        aspect = aspect_stated(self.calibration.header.made_from)
-        return observe_step(record, self.station.flange_from_gel, self.acquisition, aspect)
+        index = record.step.index
+        if index not in self._observed:
+            given = self.station.flange_from_gel, self.acquisition, self.aspect
+            self._observed[index] = observe_step(record, *given)
+        return self._observed[index]
+
+    @property
+    def aspect(self) -> float:
+        """Height of a pixel of the gel's camera over its width."""
+        return aspect_stated(self.calibration.header.made_from)
 
     def silhouette(self, record: StepRecord) -> BoolArray | None:
         """Return the object's pixels in the picture of a committed look; it is computed on first use.

@@ -9,6 +9,7 @@ number a strike. Those numbers, known up to a common complex factor, are what a 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -69,7 +70,12 @@ def analyse(strikes: Sequence[Strike], settings: Analysis | None = None) -> Soun
     Raises:
         DataRefused: rates differ, or a signal is not finite.
     """
-    settings = settings or Analysis()
+    return _analysed(tuple(strikes), settings or Analysis())
+
+
+@lru_cache(maxsize=32)
+def _analysed(strikes: tuple[Strike, ...], settings: Analysis) -> SoundEvidence:
+    """Analyse strikes once for the answers of all senses, the comparison and the report."""
     reasons = tuple(_why_not(strike, settings) for strike in strikes)
     used = np.array([reason == "" for reason in reasons], dtype=np.bool_)
     if used.sum() < 2:

@@ -78,7 +78,7 @@ def answer_run(
     silent = scene_from_json(tree, cell.name)
     experiment = named("scale-estimation")
     with closing(perform_in_process(experiment, cell, silent, station, recordings)) as case:
-        recording = case.run.recording
+        recording = case.run.files.recording
         answering = ScaleAnswering(RunFiles(recording), Accuracy.default(KNOBS))
         for record in recording.steps():
             answering.read(record)

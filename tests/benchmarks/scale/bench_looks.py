@@ -56,7 +56,7 @@ def look(cell: ScaleCell, scene: SceneFile, station: Station) -> Row:
     tree["sensors"].update(sound=False, touch=False)
     looks = scene_from_json(tree, cell.name)
     with closing(perform_in_process(named("scale-estimation"), cell, looks, station)) as case:
-        recording = case.run.recording
+        recording = case.run.files.recording
         answering = ScaleAnswering(RunFiles(recording), Accuracy.default(KNOBS))
         for record in recording.steps():
             answering.read(record)

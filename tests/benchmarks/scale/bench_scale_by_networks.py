@@ -49,7 +49,7 @@ def answered(cell: ScaleCell, scene: SceneFile, station: Station) -> Iterator[An
     """A run at both levels."""
     here = scene_of(scene, cell)
     with closing(perform_in_process(named("scale-estimation"), cell, here, station)) as case:
-        recording = case.run.recording
+        recording = case.run.files.recording
         truth = read_truth(recording)
         assert truth is not None, "no instrument read anything in this run"
         size = float(truth.differences["longest_side_m"])
