@@ -73,11 +73,12 @@ class Models:
 
 
 def prepare(model: Model, setting: Setting) -> None:
-    """Make what depends on the object alone, before any reading is needed: its samples and gains."""
+    """Make what depends on the object alone, its samples and gains, and load the kernels of an estimate."""
     spacing = accuracy_at(setting).of(SPACING)
     _ = model.surface(spacing).tree
     if model.modes is not None and needs_sound(setting):
         model.gains(spacing)
+    load_kernels(model, setting)
 
 
 _KERNELS: set[tuple[Level, ...]] = set()
@@ -130,7 +131,7 @@ def synthetic_strikes(modes: Modes, points: FloatArray) -> tuple[Strike, ...]:
 
 
 def solve(readings: Readings, setting: Setting) -> Solved[Estimate]:
-    """Answer at one setting, timed; call ``prepare`` and ``load_kernels`` before."""
+    """Answer at one setting, timed; call ``prepare`` before."""
     accuracy = accuracy_at(setting)
     cpu, wall = time.process_time(), time.perf_counter()
     estimate, refusal = None, None
@@ -181,9 +182,8 @@ class ContactAnswering:
         self._readings: Readings | None = None
         if self.model.sound_refusal and accuracy.of(SENSES) == "audio":
             raise MeshRefused(f"an estimate by sound alone was asked for, and {self._sound_refusal}")
-        prepare(self.model, accuracy)
         for sense in SENSES.levels:
-            load_kernels(self.model, {**accuracy, SENSES.name: sense})
+            prepare(self.model, {**accuracy, SENSES.name: sense})
         _ = self.symmetry
 
     @cached_property

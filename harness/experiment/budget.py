@@ -53,8 +53,6 @@ def answer_as_asked(experiment: AnyExperiment, files: RunFiles, front: Front, ta
     budgets = budgets_of(experiment)
     run = budgets.solver(files)
     front = front.fitting(run.unfit)
-    cheapest_first = sorted(_candidates(run, front, target), key=lambda point: point.seconds.value)
-    run.load([point.levels for point in cheapest_first])
     asked = ask(run, front, target)
     run.prepare(budgets.finest)
     readings = run.read(budgets.finest)
@@ -92,7 +90,7 @@ def ask(run: Solver[ReadingsT, Found], front: Front, target: Target) -> Budgeted
     """Answer a run as asked; what is prepared before is not counted.
 
     Args:
-        run: the readings; what is compiled for an answer is loaded.
+        run: the readings.
         front: settings to choose from.
         target: what is asked.
     """

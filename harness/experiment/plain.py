@@ -39,14 +39,6 @@ DEFAULT = "default"
 
 
 @dataclass(frozen=True)
-class Answered:
-    """An answer that is one number."""
-
-    value: float  #: in the experiment's own unit.
-    seconds: float  #: that it took.
-
-
-@dataclass(frozen=True)
 class PlainCell:
     """Which run: nothing is varied but the reality gap."""
 
@@ -87,13 +79,9 @@ class PlainRun:
     def unfit(self, _setting: Setting) -> None:
         """It can be answered at every setting."""
 
-    def load(self, settings: Sequence[Setting]) -> None:
-        """Load the kernels of every setting: an experiment does as it makes its readings."""
-        for setting in settings:
-            self._answering(setting)
-
-    def prepare(self, _setting: Setting) -> None:
-        """Nothing is known to depend on the object alone."""
+    def prepare(self, setting: Setting) -> None:
+        """Make the readings once: an experiment then makes and loads what it needs."""
+        self._answering(setting)
 
     def prepared_alike(self, _one: Setting, _other: Setting) -> bool:
         """Always."""

@@ -1,6 +1,6 @@
 """What is asked of an answer beside its levels, and what an experiment gives to be answered so."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeAlias, TypeVar
 
@@ -72,11 +72,8 @@ class Solver(Protocol[ReadingsT, Found]):
     def unfit(self, setting: Setting) -> str | None:
         """Why these readings cannot be answered at a setting; None where they can."""
 
-    def load(self, settings: Sequence[Setting]) -> None:
-        """Load what is compiled for answers at these settings, dearest last; no budget counts it."""
-
     def prepare(self, setting: Setting) -> None:
-        """Make what a setting needs of the object alone; no budget counts it."""
+        """Make what a setting needs of the object alone and load its kernels; no budget counts it."""
 
     def prepared_alike(self, one: Setting, other: Setting) -> bool:
         """Whether ``one`` needs nothing prepared that ``other`` does not."""

@@ -18,7 +18,6 @@ from experiments.contact_localization.accuracy.budget import Run
 from experiments.contact_localization.answer import (
     PROGRAM,
     Models,
-    load_kernels,
     observe,
     prepare,
     solve,
@@ -116,7 +115,6 @@ class Case:
     run: Run
     true_points: FloatArray
     mesh: Mesh
-    _read: dict[bool, Readings] = field(init=False, default_factory=dict, repr=False)
     _left: dict[int, float] = field(init=False, default_factory=dict, repr=False)
 
     @property
@@ -129,16 +127,12 @@ class Case:
 
     def readings(self, setting: Setting) -> Readings:
         """As a setting takes them."""
-        images = needs_images(setting)
-        if images not in self._read:
-            self._read[images] = self.run.read(setting)
-        return self._read[images].under(self.run.models.at(setting))
+        return self.run.read(setting)
 
     def sample(self, setting: Setting, contacts: int) -> Sample:
         """One setting from the first contacts: the error of the last of them, and the seconds."""
         readings = self.readings(setting).first(contacts)
         prepare(readings.model, setting)
-        load_kernels(readings.model, setting)
         with _uncollected():
             solved = solve(readings, setting)
         shared = readings.shared[0] if needs_images(setting) else 0.0

@@ -10,7 +10,6 @@ import numpy as np
 
 from experiments.contact_localization.answer import (
     Models,
-    load_kernels,
     observe,
     prepare,
     prior_of,
@@ -69,13 +68,8 @@ class Run:
         heard = any(observation.strike is not None for observation in self.observations)
         return _UNHEARD if needs_sound(setting) and not heard else None
 
-    def load(self, settings: Sequence[Setting]) -> None:
-        """Load the kernels of each sense and method."""
-        for setting in settings:
-            load_kernels(self.models.at(setting), setting)
-
     def prepare(self, setting: Setting) -> None:
-        """The object's samples and modes."""
+        """Make the object's samples and modes, and load the kernels."""
         prepare(self.models.at(setting), setting)
 
     def prepared_alike(self, one: Setting, other: Setting) -> bool:

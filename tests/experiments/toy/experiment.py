@@ -18,7 +18,7 @@ from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
 from harness.effects.quantities import Quantities
 from harness.experiment.experiment import Experiment, Helpers, Planned, Scored
-from harness.experiment.plain import Answered, plain_budgets, plain_measurement
+from harness.experiment.plain import plain_budgets, plain_measurement
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 from harness.skills.planning import ContactRequest, plan_run
@@ -70,20 +70,20 @@ class Answering:
         self.poses.append(flange @ self.run.station.flange_from_gel)
         self.seconds += time.perf_counter() - start
 
-    def answer(self) -> Answered:
-        """The height of the last touch, m in base."""
-        return Answered(float(self.poses[-1][2, 3]), self.seconds)
+    def answer(self) -> tuple[float, float]:
+        """The height of the last touch, m in base, and the seconds that it took."""
+        return float(self.poses[-1][2, 3]), self.seconds
 
 
-def result(scored: Scored[Answering, Answered]) -> dict[str, Any]:
+def result(scored: Scored[Answering, tuple[float, float]]) -> dict[str, Any]:
     """Its height, and how far off it is."""
     truth = scored.truth
-    error = None if truth is None else abs(scored.found.value - true_height(scored))
-    found, sure = scored.found, {"error_m": error, "credible90_m": CLAIMED}
-    return {"height_m": found.value, **sure, "seconds": found.seconds, "warnings": []}
+    error = None if truth is None else abs(scored.found[0] - true_height(scored))
+    (height, seconds), sure = scored.found, {"error_m": error, "credible90_m": CLAIMED}
+    return {"height_m": height, **sure, "seconds": seconds, "warnings": []}
 
 
-def true_height(scored: Scored[Answering, Answered]) -> float:
+def true_height(scored: Scored[Answering, tuple[float, float]]) -> float:
     """m in base, of the last true contact."""
     assert scored.truth is not None
     run, last = scored.run, max(scored.truth.points)
@@ -96,7 +96,7 @@ def lines(result: Mapping[str, Any]) -> list[str]:
     return [f"toy: touched at {1e3 * result['height_m']:.0f} mm"]
 
 
-def sources(scored: Scored[Answering, Answered]) -> Quantities:
+def sources(scored: Scored[Answering, tuple[float, float]]) -> Quantities:
     """Where the gel was."""
     run, gels = scored.run, np.array(scored.answering.poses)
     return {"contact_gel_from_object": inverse(gels) @ run.scene.base_from_object(run.mesh)}
