@@ -370,7 +370,7 @@ def test_the_command_measures_keeps_and_draws(
     cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "experiments.contact_localization.experiment.settings", lambda *_asked: [COARSE, DEFAULT]
+        "experiments.contact_localization.accuracy.table.settings", lambda *_asked: [COARSE, DEFAULT]
     )
     arguments = ["cost", "contact-localization", "--only", "wrench", "--seeds", "1", "--spacing", "spread"]
     arguments += ["--sense", "touch"]
