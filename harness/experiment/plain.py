@@ -34,6 +34,9 @@ from harness.experiment.truth import read_truth
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 
+TICK = 1.0e-6
+"""CPU time in s of an answer that is quicker than the clock of CPU time can measure."""
+
 DEFAULT = "default"
 """The method, and the setting, of every dial at its default."""
 
@@ -119,7 +122,7 @@ class PlainRun:
             answer = self.experiment.estimate(answering)
         except FitRefused as error:
             refusal = str(error)
-        cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
+        cpu, wall = max(time.process_time() - cpu, TICK), time.perf_counter() - wall
         if refusal is not None:
             return Solved(None, None, cpu, wall, refusal)
         truth = read_truth(self.files.recording)
