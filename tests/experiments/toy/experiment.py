@@ -59,8 +59,7 @@ class Answering:
     accuracy: Accuracy
 
     def __post_init__(self) -> None:
-        self.poses: list[FloatArray] = []
-        self.seconds = 0.0
+        self.poses, self.seconds = list[FloatArray](), 0.0
 
     def read(self, record: StepRecord) -> None:
         """The last pose of a step that was read, as the gel's."""
