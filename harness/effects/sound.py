@@ -8,14 +8,7 @@ from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
 from harness.effects.accuracy import Knob
 from harness.objectfile.file import ObjectFile
-from harness.sim.modal.modal import (
-    ELEMENT_SHARE,
-    HEARING,
-    default_edge,
-    from_arrays,
-    modes_of,
-    to_arrays,
-)
+from harness.sim.modal.modal import ELEMENT_SHARE, HEARING, default_edge, from_arrays, modes_of, to_arrays
 from harness.sim.modal.modes import dampings
 from harness.sim.solid.walls import walled
 from harness.sim.sound.modal_radiation import radiation

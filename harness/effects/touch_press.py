@@ -190,6 +190,8 @@ def press_gel(
     whole: Quantities = {
         "sensor": gel.sensor,
         "sensor_calibration": gel.calibration,
+        "sensor_rest": gel.rest,
+        "sensor_dots": gel.dots,
         "sensor_noise": gel.noise,
         "seed": gel.seed,
         "sensor_elastic": gel.elastic,
@@ -199,10 +201,6 @@ def press_gel(
     }
     if gel.shadow is not None:
         whole["sensor_shadow_table"] = gel.shadow
-    if gel.rest is not None:
-        whole["sensor_rest"] = gel.rest
-    if gel.dots is not None:
-        whole["sensor_dots"] = gel.dots
     wanted = ["touch.image", "touch.saturated", "touch.extrapolated"]
     wanted += ["touch.shadow_out_of_table"] if gel.sensor.casts_shadow else []
     wanted += ["touch.force"] if force else []
