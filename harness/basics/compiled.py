@@ -71,11 +71,11 @@ def _dependency(value: object, user: Callable[..., Any]) -> str:
         return "" if kernel.__module__ == user.__module__ else source_stamp(kernel)
     if isinstance(value, np.ndarray):
         return hashlib.sha256(f"{value.dtype.str} {value.shape}".encode() + value.tobytes()).hexdigest()
-    if isinstance(value, ModuleType):
-        return value.__name__
-    if isinstance(value, type):
-        file = getattr(sys.modules.get(value.__module__), "__file__", None)
-        return value.__qualname__ if file is None else _file_hash(file).hex()
+    if isinstance(value, ModuleType | type):
+        # Constants that are reached through a module, and the fields of a class.
+        module = value if isinstance(value, ModuleType) else sys.modules.get(value.__module__)
+        file = getattr(module, "__file__", None)
+        return value.__name__ if file is None else _file_hash(file).hex()
     return repr(value)
 
 

@@ -17,10 +17,11 @@ def scale(x):
 """
 _CALLER = """
 from harness.basics.compiled import compiled
+import constants
 from callee import scale
 @compiled
 def twice(x):
-    return 2.0 * scale(x)
+    return constants.TWO * scale(x)
 """
 _PROGRAM = """
 import caller
@@ -30,10 +31,11 @@ print(value, sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 """
 
 
-def _write(folder: Path, factor: float, extra: str = "") -> None:
+def _write(folder: Path, factor: float, extra: str = "", two: float = 2.0) -> None:
     folder.mkdir(exist_ok=True)
     (folder / "callee.py").write_text(_CALLEE.format(factor=factor, extra=extra))
     (folder / "caller.py").write_text(_CALLER)
+    (folder / "constants.py").write_text(f"TWO = {two}")
 
 
 def _run(folder: Path, cache: Path) -> list[float]:
@@ -63,6 +65,14 @@ def test_an_edited_callee_is_compiled_again(tmp_path: Path, extra: str) -> None:
     assert _run(code, cache) == [30.0, 0, 1]
     _write(code, 7.0, extra)
     assert _run(code, cache) == [42.0, 0, 1]
+
+
+def test_an_edited_constant_of_another_module_is_compiled_again(tmp_path: Path) -> None:
+    code, cache = tmp_path / "code", tmp_path / "cache"
+    _write(code, 5.0)
+    assert _run(code, cache) == [30.0, 0, 1]
+    _write(code, 5.0, two=3.0)
+    assert _run(code, cache) == [45.0, 0, 1]
 
 
 def test_a_damaged_file_is_compiled_again_and_replaced(tmp_path: Path) -> None:
