@@ -90,6 +90,21 @@ def require_objectfile(folder: Path, where: str) -> None:
     )
 
 
+def find_objectfile(named: str | Path, where: str = "object") -> Path:
+    """Find the folder of an ObjectFile by its path, its name, or ``objects/NAME``, from any folder.
+
+    Args:
+        named: path or name.
+        where: option or argument that names it, for the message.
+
+    Raises:
+        WrongUse: there is none; the nearest known name is suggested.
+    """
+    folder = objectfile_folder(str(named), Path())
+    require_objectfile(folder, where)
+    return folder
+
+
 def with_objectfile(tree: Any, folder: Path, where: str) -> Any:
     """The tree of a scene whose object is an ObjectFile, with its name and material; any other as it is.
 

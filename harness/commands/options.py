@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Annotated, overload
 import typer
 
 from harness.basics.errors import WrongUse
+from harness.bench import scene_objectfile
 from harness.bench.experiments import require_experiment
 from harness.bench.named_files import named_file, require_run
 from harness.bench.scene_objectfile import (
-    objectfile_folder,
     require_object,
-    require_objectfile,
 )
 
 if TYPE_CHECKING:
@@ -53,7 +52,7 @@ def check_object(parameter: typer.CallbackParam, name: str | None) -> str | None
 def check_objectfile(name: str | None) -> str | None:
     """Refuse an ``--objectfile`` that does not exist."""
     if name is not None:
-        require_objectfile(objectfile_folder(name, Path.cwd()), "--objectfile")
+        scene_objectfile.find_objectfile(name, "--objectfile")
     return name
 
 
@@ -84,11 +83,7 @@ def find_objectfile(parameter: typer.CallbackParam, folder: Path | None) -> Path
     Raises:
         WrongUse: there is none.
     """
-    if folder is None:
-        return None
-    found = objectfile_folder(str(folder), Path.cwd())
-    require_objectfile(found, _named(parameter))
-    return found
+    return None if folder is None else scene_objectfile.find_objectfile(folder, _named(parameter))
 
 
 Station = Annotated[

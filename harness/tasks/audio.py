@@ -11,7 +11,7 @@ import numpy as np
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.result import HIDDEN, JSON_ONLY, Result
-from harness.bench.scene_objectfile import objectfile_folder
+from harness.bench.scene_objectfile import find_objectfile
 from harness.objectfile.audio.audio import ObjectAudio, open_audio
 from harness.objectfile.audio.blow import HammerBlow, hammer, hammered
 from harness.objectfile.audio.sound_wav import BITS, wav_rate, write_wav
@@ -115,7 +115,7 @@ def render_audio(
     """Render the sound of a strike from an object's network of gains.
 
     Args:
-        folder: of the ObjectFile.
+        folder: of the ObjectFile, or its name.
         at: struck point in m, in the object's frame; or give ``vertex``.
         vertex: number of the struck vertex of the ObjectFile's mesh, counted from 0.
         force: on the object: impulse in N s, or peak force in N if a hammer is given; one inward if None.
@@ -141,7 +141,7 @@ def render_audio(
     if out is not None:
         wav_rate(rate)
     begun = time.perf_counter()
-    objectfile = ObjectFile.open(objectfile_folder(str(folder), Path.cwd()))
+    objectfile = ObjectFile.open(find_objectfile(folder))
     if level not in ("network", "table"):
         raise WrongUse(f"no level {level!r} of a sound; --level takes network, or table for the exact gains")
     audio = open_audio(objectfile, level)

@@ -18,7 +18,7 @@ from harness.basics.materials import Material
 from harness.basics.materials import material as named
 from harness.basics.result import HIDDEN, JSON_ONLY, JsonValue, Result
 from harness.basics.store import Store, default_folder
-from harness.bench.scene_objectfile import objectfile_folder
+from harness.bench.scene_objectfile import find_objectfile
 from harness.bench.sensor import DEFAULT_MAKE, described_sensor
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.published.entries import PublishedObject, open_either
@@ -39,7 +39,7 @@ def load_object(folder: str | Path) -> ObjectFile | PublishedObject:
         WrongUse: there is no ObjectFile.
         DataRefused: its ``object.json`` is damaged or of another version.
     """
-    return open_either(objectfile_folder(str(folder), Path.cwd()))
+    return open_either(find_objectfile(folder))
 
 
 @dataclass(frozen=True)

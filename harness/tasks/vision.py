@@ -14,7 +14,7 @@ from harness.basics.npz_file import write_array
 from harness.basics.result import HIDDEN, JSON_ONLY, Result
 from harness.bench.scene import load_scene
 from harness.bench.scene_camera import Lamp, scene_frame, scene_lamps, scene_pinhole
-from harness.bench.scene_objectfile import objectfile_folder
+from harness.bench.scene_objectfile import find_objectfile
 from harness.bench.station_file import load_station, station_path
 from harness.effects.scene_object import known_object
 from harness.objectfile.file import ObjectFile
@@ -151,7 +151,7 @@ def render_vision(
     """Render an object from any side in any light, by the networks of its ObjectFile.
 
     Args:
-        folder: of the ObjectFile.
+        folder: of the ObjectFile, or its name.
         camera: position in m, in the object's frame; None for one that shows the whole object.
         look_at: point in m at the centre of the picture; the centre of the object if None.
         up: direction that is up in the picture; the object's z if None.
@@ -179,7 +179,7 @@ def render_vision(
             "size, or smaller ones"
         )
     begun = time.perf_counter()
-    objectfile = ObjectFile.open(objectfile_folder(str(folder), Path.cwd()))
+    objectfile = ObjectFile.open(find_objectfile(folder))
     vision = open_vision(objectfile, threads)
     views = _views(vision, size, (camera, look_at, up), field_of_view, light, turntable or 1)
     eye, lamp = views[0]
@@ -382,7 +382,7 @@ def compare_vision(
     """Compare a camera's picture of an object with the simulated one, once both are exposed alike.
 
     Args:
-        folder: of the ObjectFile.
+        folder: of the ObjectFile, or its name.
         live: picture of a camera; None for what the camera of ``station`` sees now.
         background: picture of the bench without the object, by the same camera; None to find the object by
             its colours.
@@ -406,7 +406,7 @@ def compare_vision(
     pose = camera, look_at, up
     _require_one_camera(station, scene, live, camera, (*pose, field_of_view))
     begun = time.perf_counter()
-    objectfile = ObjectFile.open(objectfile_folder(str(folder), Path.cwd()))
+    objectfile = ObjectFile.open(find_objectfile(folder))
     vision = open_vision(objectfile, threads)
     seconds = {"load": time.perf_counter() - begun}
     begun = time.perf_counter()

@@ -36,8 +36,11 @@ def answered(name: str, folder: Path, *levels: str) -> tuple[dict[str, Any], dic
 def test_a_recorded_contact_localization_is_answered_as_before(tmp_path: Path) -> None:
     before, now = answered("contact", tmp_path / "run")
     for sense, found in before.items():
-        assert now[sense]["position_m"] == pytest.approx(found["position_m"], abs=1e-6), sense
-        assert now[sense]["credible90_m"] == pytest.approx(found["credible90_m"], abs=1e-6), sense
+        # Modes are solved on tetrahedra that fTetWild fills anew on every machine; six fillings moved the
+        # answers from sound by up to 0.12 mm. Touch uses none.
+        within = 1e-6 if sense == "touch" else 5e-4
+        assert now[sense]["position_m"] == pytest.approx(found["position_m"], abs=within), sense
+        assert now[sense]["credible90_m"] == pytest.approx(found["credible90_m"], abs=within), sense
 
 
 def test_a_recorded_scale_estimation_is_answered_as_before(tmp_path: Path) -> None:
