@@ -3,6 +3,7 @@
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
 from harness.commands import options
 from harness.commands.output import CONSOLE, print_result
@@ -24,4 +25,6 @@ def check(
     with CONSOLE.status(f"opening {station}"):
         checked = api.check_station(station, seconds)
     print_result(checked, json)
+    for name, failure in checked.failures.items():
+        CONSOLE.print(f"[bold red]error:[/] {name}: {escape(failure)}")
     return checked.exit_code

@@ -75,8 +75,8 @@ def test_a_complete_run_is_resumed_without_a_bench(
     def open_nothing(*_: object) -> None:
         raise AssertionError("a bench was opened for a run that is complete")
 
-    def finish(_kind: object, recording: Recording, *_: object, **__: object) -> dict[str, Any]:
-        return {"schema": 1, "warnings": [], "recording": str(recording.folder)}
+    def finish(_kind: object, run: RunFiles, *_: object, **__: object) -> dict[str, Any]:
+        return {"schema": 1, "warnings": [], "recording": str(run.recording.folder)}
 
     monkeypatch.setattr("harness.experiment.perform.open_station", open_nothing)
     monkeypatch.setattr("harness.commands.run.planned_run.finish", finish)

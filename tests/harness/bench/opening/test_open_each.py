@@ -119,7 +119,7 @@ def test_a_check_s_exit_code_is_that_of_the_worst(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     fakes.fails = {} if failure is None else {"arm open": failure}
-    monkeypatch.setattr("harness.bench.station_file.load_station", lambda _: station)
+    monkeypatch.setattr("harness.tasks.bench.load_station", lambda _: station)
     assert command.check("example_bench", seconds=0.0) == code
     out = capsys.readouterr()
     assert "gel" in out.out
@@ -142,7 +142,7 @@ def test_a_camera_that_is_not_there_is_wrong_use(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     blind = station.model_copy(update={"camera": None})
-    monkeypatch.setattr("harness.bench.station_file.load_station", lambda _: blind)
+    monkeypatch.setattr("harness.tasks.bench.load_station", lambda _: blind)
     with pytest.raises(WrongUse, match=words):
         photograph(name, tmp_path / "live.png", "example_bench")
     assert fakes.log == []
