@@ -39,7 +39,7 @@ GEL_VIEWER, CAMERA_VIEWER = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class LabBench:
-    """What the far ends of a mocked lab share; ``StartFarEnd`` is called with it."""
+    """Resources that the far ends of a mocked lab share; ``StartFarEnd`` is called with it."""
 
     world: World  #: behind all of them.
     shared: SharedPose  #: memory of all processes.

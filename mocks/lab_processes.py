@@ -73,7 +73,7 @@ class FarEnd(Protocol):
 
     @property
     def environment(self) -> Mapping[str, str]:
-        """What a program must have in its environment to open it."""
+        """Environment variables that a program needs to open it."""
 
     @property
     def faults(self) -> tuple[str, ...]:

@@ -78,7 +78,7 @@ class ContactChooser:
         return RayMesh(self._answering.model.mesh)
 
     def is_sure(self, recording: Recording, index: int) -> bool:
-        """Whether the contacts before ``index`` determine the place as well as the scene asks."""
+        """Return whether the contacts before ``index`` determine the place as well as the scene asks."""
         until = self._asked.until
         if until is None or index == 0:
             return False

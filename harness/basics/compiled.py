@@ -54,6 +54,7 @@ def compiled_fast(function: _F) -> _F:
     return _kept(function, numba.njit(nogil=True, fastmath=_REORDERED)(function))
 
 
+@functools.cache
 def source_stamp(function: Callable[..., Any]) -> str:
     """Hash the source file of a kernel and what it names of other files: kernels, constants, classes."""
     state = hashlib.sha256(_file_hash(inspect.getfile(function)))
@@ -165,7 +166,7 @@ def _kept(function: _F, dispatcher: Any) -> _F:
 def copy_line(target: AnyArray, source: AnyArray) -> None:
     """Write ``(n,)`` values over the first n of ``target``, which is at least as long.
 
-    In a kernel, ``target[:n] = source`` says the same, and costs seconds to compile: numba compiles the
+    In a kernel, ``target[:n] = source`` does the same, and takes seconds to compile: numba compiles the
     message about unequal shapes with it.
     """
     for i in range(len(source)):

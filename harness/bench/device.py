@@ -39,7 +39,7 @@ class Health:
 
 
 class Instrument(Protocol):
-    """What every instrument does, whatever it reads or moves."""
+    """An instrument that is opened, closed and states its health."""
 
     def open(self) -> None:
         """Connect and begin to sample; raises ``BenchFault`` naming the cable or the switch to look at."""

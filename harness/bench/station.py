@@ -242,7 +242,7 @@ def scene_of_all(station: Station, scene: SceneFile | None = None) -> SceneFile:
 
 @dataclass(frozen=True)
 class Checked:
-    """How the instruments of a bench are doing."""
+    """Health of the instruments of a bench."""
 
     instruments: tuple[Health, ...]  #: those that opened and send something.
     failures: Mapping[str, TouchstoneError]  #: by name, why the others do not.

@@ -1,4 +1,4 @@
-"""``touchstone init``: the folder of a project, with files to start from."""
+"""Command ``touchstone init``: write the folder of a project, with files to start from."""
 
 from pathlib import Path
 from typing import Annotated

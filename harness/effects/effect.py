@@ -156,7 +156,7 @@ def _require_types(effect: Effect, types: Mapping[str, object]) -> None:
 
 
 def _is_same(one: object, other: object) -> bool:
-    """Whether two annotations are one; the name decides for a class that only type checkers import."""
+    """Compare two annotations, by name where a class is imported for type checkers alone."""
     named = isinstance(one, str | ForwardRef) or isinstance(other, str | ForwardRef)
     return _text(one) == _text(other) if named else one == other
 

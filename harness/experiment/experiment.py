@@ -148,7 +148,7 @@ Models_co = TypeVar("Models_co", covariant=True)
 
 @dataclass(frozen=True)
 class Measurement(Generic[Cell_co, Models_co]):
-    """How tables and cost curves measure an experiment, by runs of ``Cell_co`` with ``Models_co``."""
+    """Measurement of an experiment for tables and cost curves, by runs of ``Cell_co`` with ``Models_co``."""
 
     estimator: str  #: module whose sources, with all they import, decide whether a curve still holds.
     conditions: tuple[MeasuredCondition, ...]  #: what is varied beside object, gap and seed.

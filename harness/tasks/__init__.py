@@ -1,1 +1,1 @@
-"""What the API computes, one module per task."""
+"""Functions of the API, one module per task."""

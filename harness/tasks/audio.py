@@ -4,7 +4,6 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from harness.sim.sound.modal_radiation import radiation
 Three = tuple[float, float, float]
 
 _MASS_OF_TIP = "steel"
-"""The hammer whose mass is taken where only a contact time is given."""
+"""Hammer whose mass is used if only a contact time is given."""
 
 _WARM_UP = 3.0
 """Longest sound in s that is computed before the timed one, to load compiled loops and sort the surface."""
@@ -81,15 +80,15 @@ class RenderedAudio(Result):
     picture: Path | None  #: spectrogram and mode shapes; None if not drawn.
     seconds: Mapping[str, float]  #: wall time by stage.
     notes: tuple[str, ...] = field(metadata=JSON_ONLY)
+    title: str = field(metadata=HIDDEN)  #: object, struck point, force and source of the gains.
     sound: FloatArray = field(metadata=HIDDEN)  #: ``(samples,)``.
 
     def summary(self) -> tuple[str, ...]:
         """State what was struck and the loudest modes."""
-        x, y, z = 1e3 * self.point_m + 0.0
         loudest = np.sort(np.argsort(-np.abs(self.amplitudes))[:_LISTED])
         listed = ", ".join(f"{frequency:.5g}" for frequency in self.frequencies_hz[loudest])
         return (
-            f"{self.object}, struck at ({x:.1f}, {y:.1f}, {z:.1f}) mm",
+            self.title,
             f"{self.modes} modes; the loudest {len(loudest)}: {listed} Hz",
         )
 
@@ -106,7 +105,7 @@ def render_audio(
     speed: float | None = None,
     duration: float = 3.0,
     rate: float = 44100.0,
-    level: Literal["network", "table"] = "network",
+    level: str = "network",
     distance: float | None = None,
     out: Path | None = None,
     full_scale: float | None = None,
@@ -127,7 +126,7 @@ def render_audio(
         speed: speed of the hammer in m/s; ``force`` is then a direction only.
         duration: length of the sound in s.
         rate: samples per second; modes at or above half of it are left out and listed.
-        level: source of the gains; ``"table"`` has the exact ones at its nodes.
+        level: source of the gains, ``"network"`` or ``"table"``, which has the exact ones at its nodes.
         distance: of the microphone in m, so that the sound is a pressure; None for the bare sum of modes.
         out: WAV file to write, 24 bits.
         full_scale: value of a sample of full scale in the file; 1 dB above the loudest sample if None.
@@ -138,13 +137,13 @@ def render_audio(
         OutOfDomain: the point is off the surface.
         DataRefused: the ObjectFile has no sound, or a file of it is damaged.
     """
+    if level not in ("network", "table"):
+        raise WrongUse(f"no level {level!r} of a sound; --level takes network, or table for the exact gains")
     if out is not None:
         wav_rate(rate)
     begun = time.perf_counter()
     objectfile = ObjectFile.open(find_objectfile(folder))
-    if level not in ("network", "table"):
-        raise WrongUse(f"no level {level!r} of a sound; --level takes network, or table for the exact gains")
-    audio = open_audio(objectfile, level)
+    audio = open_audio(objectfile, "network" if level == "network" else "table")
     if at is not None and vertex is None:
         place = place_near(audio.surface, at, audio.most)
     elif vertex is not None and at is None:
@@ -170,7 +169,7 @@ def render_audio(
         seconds["radiation"] = time.perf_counter() - begun
     made = strike(audio, place, blow, duration, rate, loudness)
     seconds |= made.seconds
-    heard, measured = ~made.left_out, audio.entry.network if level == "network" else audio.entry.table
+    audible, measured = ~made.left_out, audio.entry.network if level == "network" else audio.entry.table
     unit = "sqrt(kg) m/s" if distance is None else "Pa"
     description, pulse = objectfile.description, blow.pulse
     struck = _strike_in_words(place, blow)
@@ -201,17 +200,18 @@ def render_audio(
         distance_m=distance,
         unit=unit,
         peak=made.peak,
-        modes=int(heard.sum()),
-        frequencies_hz=audio.frequencies[heard],
-        dampings_per_s=audio.dampings[heard],
-        gains_per_sqrt_kg=made.gains[heard],
-        amplitudes=made.amplitudes[heard],
+        modes=int(audible.sum()),
+        frequencies_hz=audio.frequencies[audible],
+        dampings_per_s=audio.dampings[audible],
+        gains_per_sqrt_kg=made.gains[audible],
+        amplitudes=made.amplitudes[audible],
         left_out_hz=left_out,
         error_estimate=AudioError(made.error, {} if measured is None else measured.measured),
         wav=wav,
         picture=picture,
         seconds=seconds,
         notes=_notes(left_out, rate),
+        title=title,
         sound=made.sound,
     )
 
@@ -238,16 +238,16 @@ def _draw(audio: ObjectAudio, place: Place, made: StruckSound, title: str, path:
     from harness.report.figures.figures import Album
     from harness.report.figures.sound import SHOWN, ShownStrike, colourable, strike_figure
 
-    heard, mesh = ~made.left_out, colourable(audio.surface.mesh)
+    audible, mesh = ~made.left_out, colourable(audio.surface.mesh)
     shown = ShownStrike(
         title=title,
         mesh=mesh,
         place=place.point,
         sound=made.sound,
         rate=made.rate,
-        frequencies=audio.frequencies[heard],
-        dampings=audio.dampings[heard],
-        amplitudes=made.amplitudes[heard],
-        pushes=pushes(audio, mesh, min(SHOWN, int(heard.sum()))),
+        frequencies=audio.frequencies[audible],
+        dampings=audio.dampings[audible],
+        amplitudes=made.amplitudes[audible],
+        pushes=pushes(audio, mesh, min(SHOWN, int(audible.sum()))),
     )
     Album(path.parent).photograph(path.stem, strike_figure(shown))

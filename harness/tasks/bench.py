@@ -22,7 +22,7 @@ from harness.effects.scene_object import known_object
 from harness.picture.image_file import png_bytes
 
 _FRAMES, _FRAME_TIMEOUT = 10, 10.0
-"""Frames that are read before a picture is taken, and seconds to wait for them."""
+"""Frames that are read, of which the last is the picture, and seconds to wait for them."""
 
 
 @contextmanager
@@ -111,7 +111,7 @@ def check_station(station: str = "mock", duration: float = 3.0) -> StationCheck:
 
 @dataclass(frozen=True)
 class TakenPicture(Result):
-    """What a camera of a bench sees."""
+    """A picture that a camera of a bench took."""
 
     camera: str  #: ``"gel"`` or ``"scene"``.
     identity: str  #: model and serial number.

@@ -13,7 +13,7 @@ from harness.recording.run_folder import RunFiles
 
 
 def answer(run: str | Path, levels: Sequence[str] = ()) -> dict[str, Any]:
-    """What a recorded run says; no bench is opened and nothing is written.
+    """Answer a recorded run; no bench is opened and nothing is written.
 
     Args:
         run: its folder.

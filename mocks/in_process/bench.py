@@ -95,7 +95,7 @@ class InProcessCamera:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedLab:
-    """What the instruments of a bench in process share; ``BuildInstrument`` is called with it."""
+    """Resources that the instruments of a bench in process share; ``BuildInstrument`` is called with it."""
 
     world: World  #: behind all of them.
     stage: Stage  #: simulated time, step and sample.

@@ -48,7 +48,7 @@ LEVELS: Mapping[str, Setting] = {"shape-reconstruction": {"shape.method": QUICK}
 
 @dataclass
 class Calls:
-    """What was inverted and solved, and how often."""
+    """Counts of inverted pictures and solved answers."""
 
     pictures: Counter[bytes] = field(default_factory=Counter)
     masks: int = 0

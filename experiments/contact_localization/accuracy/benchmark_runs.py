@@ -126,7 +126,7 @@ class Case:
         """Nothing: a case is in memory alone."""
 
     def readings(self, setting: Setting) -> Readings:
-        """As a setting takes them."""
+        """Return the readings of the run at a setting."""
         return self.run.read(setting)
 
     def sample(self, setting: Setting, contacts: int) -> Sample:

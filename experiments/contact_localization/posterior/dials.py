@@ -39,5 +39,5 @@ DIALS = (SENSES, METHOD, SPACING, ROUNDS, SAMPLES, PARTICLES, BLOCK)
 
 
 def needs_images(setting: Setting) -> bool:
-    """Whether a setting uses the tactile images."""
+    """Return whether a setting uses the tactile images."""
     return setting.get(SENSES.name, SENSES.default) != "audio"

@@ -228,7 +228,7 @@ def _flags(
 
 
 def known_by(vertices: FloatArray, evidence: ShapeEvidence) -> IntArray:
-    """``(n,)`` ``UNOBSERVED``, ``SEEN`` or ``TOUCHED``."""
+    """Classify points as ``UNOBSERVED``, ``SEEN`` or ``TOUCHED``, ``(n,)``."""
     known = np.full(len(vertices), UNOBSERVED, np.int64)
     look = evidence.look
     if look is not None and look.mask.any():

@@ -85,7 +85,7 @@ def rarity_of_size(shape: FamilyShape) -> float:
 
 @lru_cache(maxsize=64)
 def _ordinary(name: str) -> tuple[FloatArray, FloatArray]:
-    """``(2,)`` mean of the logarithms of a class's widths and heights, ``(2, 2)`` their precision."""
+    """Return ``(2,)`` mean log width and log height of a class, and ``(2, 2)`` their precision."""
     random = np.random.default_rng(1)
     shapes = [draw_shape(name, random) for _ in range(DRAWS)]
     kind = CLASSES[name]

@@ -175,7 +175,7 @@ def fit_rbf(evidence: ShapeEvidence, symmetric: bool = True) -> RbfFit:
 
 
 def _field_deviation(field: ThinPlateField, vertices: FloatArray) -> FloatArray:
-    """``(n,)`` m, one standard deviation of the field at some vertices, interpolated at the others."""
+    """Return ``(n,)`` m, the field's standard deviation at some vertices, interpolated at the others."""
     some = np.random.default_rng(0).permutation(len(vertices))[:_SOME]
     deviations = field.deviations(vertices[some])
     # The other vertices are as the nearest three of those.

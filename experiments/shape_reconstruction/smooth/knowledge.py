@@ -14,7 +14,7 @@ Sides = dict[tuple[str, int], bool]
 
 
 def known_by(mesh: Mesh, samples: ContactSamples | None, silhouette: Silhouette | None) -> IntArray:
-    """``(vertices,)`` of ``TOUCHED``, ``SEEN``, ``UNOBSERVED``."""
+    """Classify vertices as ``TOUCHED``, ``SEEN`` or ``UNOBSERVED``, ``(vertices,)``."""
     known = np.full(len(mesh.vertices), UNOBSERVED, np.int64)
     if silhouette is not None:
         known[np.abs(silhouette.outside_pixels(mesh.vertices)) < limits.BORDER_DISTANCE] = SEEN
@@ -58,7 +58,7 @@ def not_bounded(sides: Sides) -> tuple[str, ...]:
 
 
 def beyond_deviation(mesh: Mesh, known: IntArray, sides: Sides, largest: float) -> FloatArray:
-    """``(vertices,)`` m, one standard deviation of unobserved parts towards sides that nothing limits.
+    """Return ``(vertices,)`` m, the standard deviation of unobserved parts towards unlimited sides.
 
     The object ends anywhere between the answer's end and the greatest length that is possible: an even
     density's deviation, as far as the vertex looks that way.

@@ -70,7 +70,7 @@ class ArmSection(InstrumentSection):
     kind: Literal["ur"] = "ur"  #: of driver.
     model: Literal["ur3e", "ur5e", "ur10e"] = "ur5e"  #: of arm.
     address: str | None = None  #: of its control box; None only in a mocked station.
-    serial: str = ""  #: of the arm, as its plate says.
+    serial: str = ""  #: number on the arm's plate.
     rate: Annotated[Frequency, Positive] = 500.0  #: Hz of the state stream.
     striker_output: Literal[0, 1] | None = None
     """the tool digital output (0 or 1) that fires the hammer's striker; None without one."""
@@ -78,7 +78,7 @@ class ArmSection(InstrumentSection):
 
     @property
     def nominal_rate(self) -> float:
-        """Hz of the state stream."""
+        """Rate of the state stream in Hz."""
         return self.rate
 
     def options(self, station: "Station", alarm: Callable[[], str]) -> dict[str, object]:

@@ -93,7 +93,7 @@ class GelSection(_HttpCameraSection):
 
     @property
     def described(self) -> SensorDescription:
-        """The make, as its file says."""
+        """Description of the make, from its file."""
         return described_sensor(self.make)
 
     @property
@@ -115,7 +115,7 @@ class GelSection(_HttpCameraSection):
 
     @property
     def nominal_rate(self) -> float:
-        """Hz, as its maker states it."""
+        """Frame rate in Hz, as the maker states it."""
         return self.rate
 
     def options(self, _station: "Station", _alarm: Callable[[], str]) -> dict[str, object]:

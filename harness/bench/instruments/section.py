@@ -91,7 +91,7 @@ class Placement(StrictModel):
 
 
 def _beside_station(named: str, info: ValidationInfo) -> str:
-    """Return the absolute path of a file beside the station file, or the name as it is given."""
+    """Return the absolute path of a file next to the station file, or the given name."""
     folder: Path | None = (info.context or {}).get("folder")
     return str(real_path(folder / named)) if folder is not None and (folder / named).exists() else named
 
@@ -102,7 +102,7 @@ CalibrationName = Annotated[str, AfterValidator(_beside_station)]
 
 @dataclass(frozen=True)
 class AtRest:
-    """What an instrument reads while nothing is touched or struck."""
+    """Readings of an instrument while nothing is touched or struck."""
 
     levels: Mapping[str, float] = field(default_factory=dict)  #: by a key with the unit, for ``--json``.
     remarks: Mapping[str, str] = field(default_factory=dict)  #: by instrument, for the operator.
@@ -131,17 +131,17 @@ class InstrumentSection(StrictModel):
 
     @property
     def needs_address(self) -> bool:
-        """Whether the instrument of a real bench is found by its address alone."""
+        """Return whether a real instrument needs an address in the station file."""
         return True
 
     @property
     def is_instrument(self) -> bool:
-        """Whether it has a driver of its own; False for a channel of another instrument's box."""
+        """Return whether it has a driver of its own; False for a channel of another instrument's box."""
         return True
 
     @property
     def nominal_rate(self) -> float | None:
-        """Hz, as the station states it; None where it does not."""
+        """Nominal rate in Hz; None where the station states none."""
         return None
 
     def is_wanted(self, _sensors: Sensors) -> bool:

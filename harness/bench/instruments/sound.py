@@ -25,7 +25,7 @@ class _SoundSection(InstrumentSection):
     """An instrument that a scene with sound calls for."""
 
     def is_wanted(self, sensors: Sensors) -> bool:
-        """Return whether the scene asks for sound."""
+        """Return whether the scene calls for sound."""
         return sensors.sound
 
 
@@ -46,7 +46,7 @@ class HammerSection(_SoundSection):
     of each channel means."""
     threshold: Annotated[Force, Positive] = 2.0  #: N at which a strike is noticed.
     strike: Literal["arm", "operator"] = "arm"
-    """who fires it: the arm's ``striker_output``, or a person who is asked to."""
+    """who fires it: the arm's ``striker_output``, or the operator."""
     stand_off: Annotated[Length, Positive] = 6e-3
     """m between the tip at rest and the surface when the striker is fired."""
 
@@ -71,7 +71,7 @@ class HammerSection(_SoundSection):
 
     @property
     def nominal_rate(self) -> float:
-        """Hz, samples of each channel."""
+        """Sampling rate of each channel in Hz."""
         return self.rate
 
     def options(self, station: "Station", _alarm: Callable[[], str]) -> dict[str, object]:
@@ -145,7 +145,7 @@ class MicrophoneSection(_SoundSection):
 
     @property
     def nominal_rate(self) -> float | None:
-        """Hz; None on the hammer's box."""
+        """Sampling rate in Hz; None on the hammer's box."""
         return self.rate
 
     def options(self, station: "Station", _alarm: Callable[[], str]) -> dict[str, object]:

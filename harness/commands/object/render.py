@@ -85,8 +85,6 @@ def render(
     options.require_files(("--out", out, ".wav"), ("--picture", picture, ".png"))
     if impulse and (hammer is not None or contact_time is not None):
         raise WrongUse("--impulse takes no time, and --hammer and --contact-time do; say one or the other")
-    if level not in ("network", "table"):
-        raise WrongUse(f"no level {level!r} of a sound; --level takes network, or table for the exact gains")
     rendered = api.render_audio(
         folder,
         at=None if at is None else places.point("--at", at),
@@ -99,7 +97,7 @@ def render(
         speed=options.quantity("--speed", speed, SPEED),
         duration=seconds,
         rate=rate,
-        level="network" if level == "network" else "table",
+        level=level,
         distance=options.quantity("--distance", distance, LENGTH),
         out=out,
         full_scale=full_scale,

@@ -37,7 +37,7 @@ class NextContact(Protocol):
     """Chooses the contacts of a run one at a time, from the readings of the steps before."""
 
     def is_sure(self, recording: Recording, index: int) -> bool:
-        """Whether the steps before ``index`` determine the answer as well as the scene asks."""
+        """Return whether the steps before ``index`` determine the answer as well as the scene asks."""
 
     def plan(self, recording: Recording, index: int) -> dict[str, Any]:
         """Return the parameters of the contact that is step ``index``.

@@ -1,4 +1,4 @@
-"""What takes a quantity has its type: checked as the catalogue is built, and by mypy from scene to image."""
+"""Parameters have the types of their quantities: checked by the catalogue, and by mypy from end to end."""
 
 import ast
 import importlib.util

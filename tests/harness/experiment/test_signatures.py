@@ -1,4 +1,4 @@
-"""What crosses the border of ``harness.experiment`` has a type."""
+"""Signatures of ``harness.experiment`` are typed."""
 
 import ast
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ FOLDER = Path(harness.experiment.__file__).parent
 
 
 def annotations(tree: ast.Module) -> Iterator[ast.expr]:
-    """Of every function's arguments and result, and of every field of a class."""
+    """Yield the annotations of arguments, results and fields."""
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):
             arguments = (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
