@@ -18,8 +18,8 @@ from mocks.camera.gelsight_stream import MjpegServer
 from mocks.faults import CAMERA_FAULTS, HAMMER_FAULTS
 from mocks.lab_processes import CAMERA_PORT, GEL_PORT, ChildPipe, FarEnd, LabChild, keep_time
 from mocks.shared_pose import SharedPose
-from mocks.ur.faults import KINDS as ARM_FAULTS
 from mocks.ur.hooks import LEFT_ABOVE, ControllerConfig
+from mocks.ur.serve import KINDS as ARM_FAULTS
 from mocks.ur.serve import serve
 from mocks.world.world import World
 
@@ -178,7 +178,7 @@ def start_hammer(name: str, lab: LabBench) -> FarEnd:
     if lab.station.own_microphone is None:
         source = StrikesOnBox(lab.strikes, lambda: lab.shared.firing)
     else:
-        from mocks.sound_card.strike_on_card import PluggedCard, StrikesOnCard
+        from mocks.sound_card.card import PluggedCard, StrikesOnCard
 
         card = lab.end(MICROPHONE)
         if not isinstance(card, PluggedCard):

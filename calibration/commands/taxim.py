@@ -276,8 +276,8 @@ def chosen(folder: Path | None, wanted: PressRequest) -> None:
 
 def pressed(wanted: PressRequest, as_json: bool) -> Path | None:
     """The folder of the run that the arm made or went on with; None where Ctrl-C ended it early."""
+    from calibration.taxim.arm.press import procedure
     from calibration.taxim.arm.record import NAME
-    from calibration.taxim.arm.session import procedure
     from harness.experiment.lookup import require_of
     from harness.experiment.perform import describe_bench, perform_on_bench, steps_planned
     from harness.recording.recording import Recording
@@ -308,7 +308,7 @@ def pressed(wanted: PressRequest, as_json: bool) -> Path | None:
 
 def _begun(wanted: PressRequest) -> "Recording":
     from calibration.taxim.arm.plan import PressSettings
-    from calibration.taxim.arm.session import ball_scene, procedure
+    from calibration.taxim.arm.press import ball_scene, procedure
     from harness.bench.scene import load_scene
     from harness.bench.station_file import load_station, station_path
     from harness.experiment.begin import begin

@@ -12,7 +12,7 @@ from harness.picture.dot_lattice import DotLattice
 from harness.report.figures.calibration import found_figure, off_figure
 from harness.report.figures.figures import Album
 from harness.report.template import write_page
-from harness.sim.gel.marker_file import MarkerDot, MarkerFile
+from harness.sim.gel.markers import MarkerDot, MarkerFile
 
 PAGE = "markers.html"
 """Name of the page in its folder."""

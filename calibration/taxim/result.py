@@ -7,20 +7,22 @@ from datetime import UTC, datetime
 from json import dumps
 from pathlib import Path
 
+import numpy as np
+
 from calibration.taxim.arm.moves import ArmScale, Uncertain
 from calibration.taxim.arm.record import NAME, ArmPresses, read_arm_run
 from calibration.taxim.mark_free import Identity, MarkFree, calibrate
 from calibration.taxim.pictures import Channels, Pictures, Refused, read_pictures, squared
-from calibration.taxim.polycalib import write_polycalib
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, WrongUse
+from harness.basics.npz_file import write_arrays
 from harness.basics.result import HIDDEN, JSON_ONLY, Result, json_value
 from harness.basics.whole_file import write_text_whole
 from harness.bench.sensor import GELSIGHT_R15, TactileSensor, described_sensor, shipped_sensors
 from harness.recording.recording import Recording
 from harness.sim.optics.lit_calibration import read_calibration, shadow_of
 from harness.sim.optics.shadow_file import write_shadow_table
-from harness.sim.optics.tactile_calibration import save_calibration
+from harness.sim.optics.tactile_calibration import TactileCalibration, save_calibration
 
 NO_MOVES = (
     "no arm moves are known of these pictures: ball presses alone cannot tell millimetres per pixel, aspect "
@@ -442,3 +444,18 @@ def _summarize_shadow(fitted: MarkFree) -> ShadowSummary:
         better_share=None if score is None else score.better,
         presses=0 if score is None else score.presses,
     )
+
+
+def write_polycalib(calibration: TactileCalibration, path: Path) -> None:
+    """Write ``polycalib.npz``: the number of bins and one table a channel.
+
+    The layout names its channels r, g, b and holds what OpenCV reads, blue first: ``grad_r`` is blue.
+    Taxim's program takes it so, and so does ours.
+
+    Args:
+        calibration: whose table is written; pitch, background and quality have no place in the file.
+        path: of the file.
+    """
+    red, green, blue = (calibration.table[..., c].astype(np.float64) for c in range(3))
+    bins = np.array(calibration.bins, dtype=np.int64)
+    write_arrays(path, {"bins": bins, "grad_r": blue, "grad_g": green, "grad_b": red})

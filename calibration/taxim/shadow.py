@@ -26,8 +26,7 @@ from calibration.taxim.light_fit import REACH, GelLight, light_shades, pressed_b
 from calibration.taxim.pictures import PressPack
 from calibration.taxim.smooth_fit import distance
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
-from harness.sim.optics.shadow import RIM, ShadowTable
-from harness.sim.optics.shadow_image import soft_shadows
+from harness.sim.optics.shadow import RIM, ShadowTable, soft_shadows
 
 COLOURS = ("red", "green", "blue")
 

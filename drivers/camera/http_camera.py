@@ -18,9 +18,8 @@ from harness.basics.arrays import ByteArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
 from harness.basics.starvation import LATE, WATCH, name_cause
-from harness.bench.device import Health
+from harness.bench.device import Channel, Health, Reading
 from harness.bench.instruments.cameras import USB_CAMERA
-from harness.bench.reading import Channel, Reading
 from harness.bench.sensor import TactileSensor
 from harness.picture.image_file import decode_jpeg
 

@@ -30,8 +30,7 @@ from harness.basics.errors import BenchFault, WrongUse
 from harness.bench.acquisition import AcquisitionCalibration
 from harness.bench.acquisition_channels import BLOCK, CaptureForm, readings_of_capture
 from harness.bench.clock_fit import ClockFit
-from harness.bench.device import Health
-from harness.bench.reading import Reading
+from harness.bench.device import Health, Reading
 
 _CHANNELS = 2
 _CLOCK_PAIRS = 64

@@ -7,9 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from drivers.microphone.blocks import Block, Blocks, Format, Trigger
 from drivers.microphone.readings import (
     SETTLE,
+    Block,
+    Blocks,
+    Format,
+    Trigger,
     clock_of,
     places_of_doubt,
     readings,
@@ -21,9 +24,8 @@ from drivers.microphone.readings import (
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
 from harness.basics.starvation import WATCH, name_cause
-from harness.bench.device import Health
+from harness.bench.device import Health, Reading
 from harness.bench.microphone_take import OTHER_STATUS, SAMPLES_LOST, SILENCE_INSERTED, UNTRIGGERED
-from harness.bench.reading import Reading
 
 STALL = 0.5
 """s without a block after which the device is taken to be gone."""

@@ -23,8 +23,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault, LimitExceeded, MotionEnded, SafetyStop, TouchstoneError
 from harness.basics.geometry import translation, vector_from_rotation
-from harness.bench.device import ArmState, Health
-from harness.bench.reading import Reading
+from harness.bench.device import ArmState, Health, Reading
 
 ANSWER_WITHIN: Final = 2.0  # s
 MOTION_SPARE: Final = 3.0  # s beyond the time a motion should take, before the child gives up

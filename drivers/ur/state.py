@@ -13,8 +13,7 @@ from harness.basics.geometry import (
     transform,
 )
 from harness.bench import kinematics
-from harness.bench.device import ArmState
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import ArmState, Channel, Reading
 
 SAME_POSE: Final = 5e-3  # m between the model's flange and the controller's
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.dials import (
+from experiments.contact_localization.posterior.estimate import (
     BLOCK,
     METHOD,
     PARTICLES,
@@ -19,10 +19,11 @@ from experiments.contact_localization.posterior.dials import (
     SAMPLES,
     SENSES,
     SPACING,
+    Estimate,
     Senses,
+    locate,
 )
-from experiments.contact_localization.posterior.estimate import Estimate, locate
-from experiments.contact_localization.posterior.noise import noise_at
+from experiments.contact_localization.posterior.likelihood import noise_at
 from experiments.contact_localization.posterior.policy import Readings, estimate_contacts, read
 from experiments.contact_localization.section import Localization
 from experiments.contact_localization.settings import SIMULATED, accuracy_at, needs_sound

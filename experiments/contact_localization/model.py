@@ -12,7 +12,7 @@ from harness.basics.errors import WrongUse
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
 from harness.basics.symmetry import find_symmetries
-from harness.bench.bench_errors import USUAL, BenchErrors
+from harness.bench.gap import USUAL, BenchErrors
 from harness.bench.sensor import TactileSensor
 from harness.sim.gel.height_map import RasterMesh, first_surface
 from harness.sim.gel.view import FirstSurface

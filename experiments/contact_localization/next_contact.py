@@ -22,14 +22,13 @@ from harness.experiment.levels import chosen_levels
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.skills.exploring.bayes_risk import bayes_risk_after
-from harness.skills.exploring.surroundings import end_of
+from harness.skills.exploring.lines import end_of
 from harness.skills.planning import Itinerary
 from harness.skills.press import ContactMotion
 from harness.skills.sites import PressLimits, Site, candidate_sites
 from harness.skills.strike import planner
 from harness.twin.bench import TwinBench
-from harness.twin.motion import reachable
-from harness.twin.strike_motion import StrikePlanner
+from harness.twin.motion import StrikePlanner, reachable
 
 CANDIDATES = 24
 """Places drawn for each contact; of those with a free way the one that leaves least error is taken."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
-from experiments.contact_localization.posterior.dials import (
+from experiments.contact_localization.posterior.estimate import (
     BLOCK,
     DIALS,
     METHOD,

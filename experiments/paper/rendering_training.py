@@ -45,7 +45,7 @@ from harness.basics.arrays import AnyArray, BoolArray, FloatArray
 from harness.objectfile.audio.part import network_tensors
 from harness.objectfile.published.look import osf_tensors
 from harness.picture.srgb import bytes_from_linear
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.press_pose import Presses
 
 Drawn = Callable[[np.random.Generator], tuple[FloatArray, AnyArray, AnyArray]]
 """From a generator to ``(batch, inputs)`` normalised inputs, ``(batch, outputs)`` targets and ``(batch,)``

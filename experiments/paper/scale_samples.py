@@ -7,8 +7,14 @@ import numpy as np
 from experiments.paper.scale_networks import FIELD, SIDE, sequence_of, spectrogram_of
 from experiments.scale_estimation.unseen.training.contact_samples import TouchableShape, imprint_sample
 from experiments.scale_estimation.unseen.training.outlines import PLACE, PUT, drawn_camera
-from experiments.scale_estimation.unseen.training.samples import SampleRow, draw_size, ringing_of, shape_of
-from experiments.scale_estimation.unseen.training.strike_samples import RATE, strike_responses
+from experiments.scale_estimation.unseen.training.samples import (
+    RATE,
+    SampleRow,
+    draw_size,
+    ringing_of,
+    shape_of,
+    strike_responses,
+)
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import apply, inverse, transform

@@ -24,11 +24,11 @@ from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief, SizeRange, fused
 from experiments.scale_estimation.sound.peaks import Peaks, RingingModel
-from experiments.scale_estimation.touch.patch import Patch
+from experiments.scale_estimation.touch.fit import Patch
 from experiments.scale_estimation.touch.touch import by_touch
 from experiments.scale_estimation.unseen.answer import imprints_alone
 from experiments.scale_estimation.unseen.spectrogram import response_of
-from experiments.scale_estimation.vision.fit import View
+from experiments.scale_estimation.vision.vision import View
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import DataRefused, FitRefused

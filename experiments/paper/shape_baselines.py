@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import QhullError, cKDTree
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.fits import UNOBSERVED, ShapeEstimate
 from experiments.shape_reconstruction.prior.network import require_silhouette, shipped
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples
 from experiments.shape_reconstruction.smooth.free_space import (
@@ -23,13 +24,11 @@ from experiments.shape_reconstruction.smooth.knowledge import (
     limited_sides,
     not_bounded,
 )
-from experiments.shape_reconstruction.surface import UNOBSERVED, ShapeEstimate
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import FitRefused
 from harness.basics.faces.mesh_rays import column_crossings
 from harness.basics.geometry import rotation_about
-from harness.basics.mesh import Mesh
-from harness.basics.mesh_hull import closed_hull
+from harness.basics.mesh import Mesh, closed_hull
 from harness.sim.solid.household.families import FAMILIES, draw
 
 SHAPES = 65

@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull, cKDTree
 from scipy.spatial.distance import cdist
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.fits import ShapeEstimate
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
 from experiments.shape_reconstruction.smooth.free_space import (
     Silhouette,
@@ -24,7 +25,6 @@ from experiments.shape_reconstruction.smooth.knowledge import (
     limited_sides,
     not_bounded,
 )
-from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import MeshRefused, WrongUse
 from harness.basics.faces.nearest_surface import NearestSurface

@@ -13,9 +13,11 @@ from scipy.spatial import cKDTree
 from experiments.paper.shape_baselines import by_average, by_hull, by_visual_hull, glance_points
 from experiments.paper.shape_network import SENSES, PaperCompletion, paper_completions
 from experiments.paper.shape_retrieval import LibraryShape, by_retrieval, household_library, library_of
+from experiments.shape_reconstruction.answer import evidence_of
 from experiments.shape_reconstruction.cells import PRESSES, ShapeCell, scene_of
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.experiment import MEASUREMENT, NAME
+from experiments.shape_reconstruction.fits import ShapeEstimate
 from experiments.shape_reconstruction.methods import METHODS, estimated
 from experiments.shape_reconstruction.metric import (
     PUBLISHED_POINTS,
@@ -25,10 +27,8 @@ from experiments.shape_reconstruction.metric import (
     published_points_chamfer,
     surfaces_apart,
 )
-from experiments.shape_reconstruction.readings import evidence_of
 from experiments.shape_reconstruction.result import true_surface
 from experiments.shape_reconstruction.section import MOST_PRESSES, ShapeRun
-from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import DataRefused, FitRefused, OutOfDomain

@@ -52,7 +52,7 @@ from harness.objectfile.touch.touch import Maps, ReferenceMaps, open_touch
 from harness.objectfile.touch_entries import GelEntry
 from harness.objectfile.vision_tensors import graph_input
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.press_pose import Presses
 from harness.sim.optics.optics import Optics
 from harness.sim.optics.tactile_calibration import TactileCalibration, shipped_calibration
 

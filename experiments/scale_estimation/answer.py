@@ -8,13 +8,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from experiments.scale_estimation.dials import STARTS
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief, fused
 from experiments.scale_estimation.sound.hearing import Hearing, by_sound
 from experiments.scale_estimation.sound.peaks import Peaks, load_kernels
-from experiments.scale_estimation.touch.patch import Patch, free_line, patch_of
+from experiments.scale_estimation.touch.fit import Patch, free_line, patch_of
 from experiments.scale_estimation.touch.touch import Touch, by_touch
 from experiments.scale_estimation.unseen.answer import (
     ShapelessAnswer,
@@ -30,7 +29,9 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused, MeshRefused, PictureRefused, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.bench.acquisition import Strike
-from harness.effects.accuracy import Accuracy
+from harness.effects.accuracy import Accuracy, Knob, Level
+from harness.effects.catalogue import EFFECTS
+from harness.effects.effect import knobs_of
 from harness.experiment.experiment import Scored
 from harness.experiment.object_modes import carried_by
 from harness.picture.outline import SeenOutline, read_outline
@@ -41,6 +42,19 @@ from harness.sim.optics.inverse import GelReader
 from harness.skills.exploring.exploration import SKIPPED
 from harness.strikes.peaks import analyse
 from harness.strikes.spectra import Analysis
+
+STARTS = Knob(
+    "scale.starts",
+    (1, 4, 12, 40),
+    "",
+    "number",
+    12,
+    "best places of the contacts' first scan that are refined",
+)
+"""Matters where the shape is known; an answer about an unknown shape has no dial of its own."""
+
+KNOBS: tuple[Knob[Level], ...] = (STARTS, *knobs_of(EFFECTS))
+
 
 SENSES = ("vision", "audio", "touch")
 

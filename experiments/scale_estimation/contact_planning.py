@@ -15,17 +15,14 @@ from scipy.spatial import cKDTree
 
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.section import Scale
-from experiments.scale_estimation.touch.fit import DISTANCE_SIGMA, UNKNOWNS, FreeSpace, TouchProblem
-from experiments.scale_estimation.touch.patch import Patch
+from experiments.scale_estimation.touch.fit import DISTANCE_SIGMA, UNKNOWNS, FreeSpace, Patch, TouchProblem
 from experiments.scale_estimation.vision.vision import SeenStand
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import MotionRefused, WrongUse
 from harness.basics.geometry import apply, transform
-from harness.basics.mesh import Mesh
-from harness.basics.mesh_hull import closed_hull, hull_of
+from harness.basics.mesh import Mesh, closed_hull, hull_of
 from harness.sim.gel.height_map import RasterMesh
-from harness.skills.exploring.lines import LINES, LOWEST, LineTarget
-from harness.skills.exploring.surroundings import Surroundings, rehearsed_strike
+from harness.skills.exploring.lines import LINES, LOWEST, LineTarget, Surroundings, rehearsed_strike
 from harness.skills.exploring.unknown_space import PLACES, around, margin_of
 from harness.skills.planning import Itinerary
 from harness.skills.press import ContactMotion

@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from experiments.scale_estimation.answer import ScaleAnswering
+from experiments.scale_estimation.answer import KNOBS, STARTS, ScaleAnswering
 from experiments.scale_estimation.cells import DRAWN, LOOKING, cells, scene_of
-from experiments.scale_estimation.dials import KNOBS, STARTS
 from experiments.scale_estimation.explorer import performer, plan, smallest_error, steps_of
 from experiments.scale_estimation.report import write
 from experiments.scale_estimation.result import lines_of, result_of

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.scale_estimation.answer import ScaleAnswering, patch_of_contact
+from experiments.scale_estimation.answer import KNOBS, ScaleAnswering, patch_of_contact
 from experiments.scale_estimation.contact_planning import (
     aims_unmet,
     blind_envelope,
@@ -20,18 +20,16 @@ from experiments.scale_estimation.contact_planning import (
     seen_envelope,
     strike_met,
 )
-from experiments.scale_estimation.dials import KNOBS
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import CREDIBLE, SHARED
-from experiments.scale_estimation.touch.fit import UNKNOWNS, FreeSpace, TouchProblem
-from experiments.scale_estimation.touch.patch import Patch
+from experiments.scale_estimation.touch.fit import UNKNOWNS, FreeSpace, Patch, TouchProblem
 from experiments.scale_estimation.touch.touch import by_touch
 from experiments.scale_estimation.vision.vision import SeenStand
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, MotionRefused, PictureRefused, WrongUse
 from harness.basics.mesh import Mesh
-from harness.bench.reading import Reading
+from harness.bench.device import Reading
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.experiment.experiment import ErrorBound, Helpers, Planned
@@ -42,8 +40,14 @@ from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import Step, StepRecord
 from harness.skills.exploring.exploration import Exploration, kinds, press_into_unknown
-from harness.skills.exploring.lines import LineTarget, contact_along, lines_to, unlike_first
-from harness.skills.exploring.surroundings import Surroundings, end_of
+from harness.skills.exploring.lines import (
+    LineTarget,
+    Surroundings,
+    contact_along,
+    end_of,
+    lines_to,
+    unlike_first,
+)
 from harness.skills.exploring.unknown_space import (
     FLAT,
     SeenThing,

@@ -10,12 +10,11 @@ from experiments.scale_estimation.size import SizeRange
 from experiments.scale_estimation.sound.hearing import MaterialGuess
 from experiments.scale_estimation.sound.peaks import RingingModel
 from experiments.scale_estimation.touch.fit import Stand, StandErrors
-from experiments.scale_estimation.vision.fit import View
+from experiments.scale_estimation.vision.vision import View
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.materials import KNOWN, MATERIALS
-from harness.basics.mesh import Mesh
-from harness.basics.mesh_hull import hull_of
+from harness.basics.mesh import Mesh, hull_of
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy, Level
@@ -23,7 +22,7 @@ from harness.experiment.object_modes import ReadFile, object_modes
 from harness.experiment.repeated_readings import PlaceTolerance
 from harness.picture.camera_errors import CameraErrors
 from harness.sim.solid.surface_samples import sample_surface
-from harness.skills.exploring.surroundings import nowhere
+from harness.skills.exploring.lines import nowhere
 from harness.skills.exploring.unknown_space import UnknownStand
 from harness.twin.bench import TwinBench
 from harness.twin.bench_of import twin_of

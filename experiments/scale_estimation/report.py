@@ -12,7 +12,7 @@ from experiments.scale_estimation.unseen.spectrogram import FRAMES, bands_of, le
 from experiments.scale_estimation.vision.vision import Sight
 from harness.basics.errors import FitRefused
 from harness.basics.materials import MATERIALS
-from harness.basics.mesh_hull import hull_of
+from harness.basics.mesh import hull_of
 from harness.bench.device import Health
 from harness.experiment.compare import Comparison
 from harness.experiment.lookup import named

@@ -1,20 +1,72 @@
 """From a run's readings to the shape of its object: by the picture, by touch, and by both."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
-from experiments.shape_reconstruction.evidence import ShapeEvidence
+import numpy as np
+
+from experiments.shape_reconstruction import thresholds as limits
+from experiments.shape_reconstruction.contact_points import contact_points
+from experiments.shape_reconstruction.evidence import GuardedTouch, SeenMask, ShapeEvidence
+from experiments.shape_reconstruction.fits import ShapeEstimate
 from experiments.shape_reconstruction.methods import METHOD, estimated, load_kernels
-from experiments.shape_reconstruction.readings import ShapeReadings
-from experiments.shape_reconstruction.surface import ShapeEstimate
-from harness.basics.errors import FitRefused, WrongUse
+from experiments.shape_reconstruction.section import ShapeRun
+from harness.basics.arrays import BoolArray, FloatArray, read_only
+from harness.basics.errors import FitRefused, PictureRefused, WrongUse
+from harness.basics.geometry import apply, translation
 from harness.effects.accuracy import Accuracy
 from harness.experiment.experiment import Scored
+from harness.recording.observation import picture_left_out
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
-from harness.skills.exploring.exploration import SKIPPED
+from harness.skills.exploring.exploration import SKIPPED, SPEEDS
+from harness.skills.press import ContactMotion
+
+HOUSING_DEPTH = 0.12
+"""M behind the face of the sensor's housing that are the sensor's."""
+
+
+@dataclass(eq=False)
+class ShapeReadings:
+    """What the steps read so far say; each step is read once.
+
+    Args:
+        run: the folder.
+    """
+
+    run: RunFiles
+    touches: list[GuardedTouch] = field(default_factory=list, init=False)
+    look: SeenMask | None = field(default=None, init=False)
+    refused_pictures: list[str] = field(default_factory=list, init=False)
+
+    def read(self, record: StepRecord) -> None:
+        """Take in a step: a look, a press, or one that was not made."""
+        silhouette = self.run.silhouette(record)
+        if silhouette is not None:
+            self.look = seen_mask(self.run, silhouette)
+        elif "gel.image" in record.readings:
+            try:
+                self.touches.append(guarded_touch(self.run, record))
+            except PictureRefused as refusal:  # whether the gel met anything is not known either
+                self.refused_pictures.append(picture_left_out(record.step.index, refusal))
+
+    def evidence(self) -> ShapeEvidence:
+        """All of it."""
+        settings, sensor = self.run.scene.section(ShapeRun), self.run.station.gel.sensor
+        return ShapeEvidence(
+            touches=tuple(self.touches),
+            look=self.look,
+            housing=sensor.housing,
+            gel_thickness=sensor.gel_thickness,
+            housing_depth=HOUSING_DEPTH,
+            place_error=settings.place_error,
+            support_error=settings.support_error,
+            largest=settings.largest,
+            errors=self.run.station.errors,
+        )
+
 
 SENSES = ("vision", "touch", "fused")
 
@@ -116,3 +168,71 @@ class ShapeAnswering:
 
 ScoredShape: TypeAlias = Scored[ShapeAnswering, ShapeAnswer]
 """An answer with what it is compared with."""
+
+
+def evidence_of(run: RunFiles, records: Iterable[StepRecord]) -> ShapeEvidence:
+    """What these steps of a run say."""
+    readings = ShapeReadings(run)
+    for record in records:
+        readings.read(record)
+    return readings.evidence()
+
+
+def base_from_stand(run: RunFiles) -> FloatArray:
+    """``(4, 4)``: the frame of all evidence, where the scene nominally puts the object on its support."""
+    return translation(np.array(run.scene.object.pose.position))
+
+
+def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
+    """One way of the gel.
+
+    Raises:
+        RecordingDamaged: the step has no pictures or no poses.
+        PictureRefused: its picture is not what the calibration was made of.
+    """
+    settings, seen = run.scene.section(ShapeRun), run.observe(record)
+    read = run.gel_reader.read(seen.images)
+    read.require_accepted()
+    found = contact_points(read.height, read.error, run.station.gel.sensor.pitch)
+    stand_from_gel = seen.base_from_gel.copy()
+    stand_from_gel[:3, 3] -= base_from_stand(run)[:3, 3]
+    nothing = np.zeros((0, 3))
+    stand_off = np.asarray(record.step.parameters["base_from_stand_off"]) @ run.station.flange_from_gel
+    # From the stand-off to where the gel ended; the arm's noise makes no way shorter than none.
+    way = max(0.0, float(stand_off[:3, 2] @ (seen.base_from_gel[:3, 3] - stand_off[:3, 3])))
+    longest = ContactMotion.from_parameters(record.step.parameters).longest(SPEEDS)
+    return GuardedTouch(
+        stand_from_gel=read_only(stand_from_gel),
+        way=way,
+        points=read_only(nothing if found is None else apply(stand_from_gel, found.points)),
+        normals=read_only(nothing if found is None else found.normals @ stand_from_gel[:3, :3].T),
+        sigma=float(np.hypot(settings.contact_error, 0.0 if found is None else found.error)),
+        normal_sigma=settings.contact_tilt_error,
+        index=record.step.index,
+        clear=read_only(nothing if found is None else apply(stand_from_gel, found.clear)),
+        stopped=way < longest - limits.MIN_EARLY_END,
+    )
+
+
+def seen_mask(run: RunFiles, mask: BoolArray) -> SeenMask | None:
+    """Return the silhouette as evidence; None if the camera did not see the object.
+
+    Args:
+        run: folder of the run.
+        mask: ``(rows, columns)`` the object's pixels.
+    """
+    camera, settings = run.station.camera, run.scene.section(ShapeRun)
+    assert camera is not None  # there are its pictures
+    if mask.sum() < limits.MIN_PIXELS:
+        return None
+    stand_from_camera = camera.base_from_camera.matrix.copy()
+    stand_from_camera[:3, 3] -= base_from_stand(run)[:3, 3]
+    return SeenMask(
+        mask=mask,
+        hidden=read_only(np.zeros(mask.shape, np.bool_)),
+        stand_from_camera=read_only(stand_from_camera),
+        focal_length=camera.focal_length,
+        position_error=settings.camera_position_error,
+        rotation_error=settings.camera_rotation_error,
+        focal_length_error=settings.focal_length_error,
+    )

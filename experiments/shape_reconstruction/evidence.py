@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.basics.arrays import BoolArray, FloatArray, read_only
 from harness.basics.errors import OutOfDomain
-from harness.bench.bench_errors import USUAL, BenchErrors
+from harness.bench.gap import USUAL, BenchErrors
 from harness.experiment.repeated_readings import PlaceTolerance, group_by_place
 
 

@@ -8,12 +8,12 @@ from functools import cache, partial
 import numpy as np
 
 from experiments.shape_reconstruction.evidence import GuardedTouch, SeenMask, ShapeEvidence
-from experiments.shape_reconstruction.family.settings import CONTINUED, LEVELS, FamilySettings
+from experiments.shape_reconstruction.family.search import CONTINUED, LEVELS, FamilySettings
+from experiments.shape_reconstruction.fits import ShapeEstimate
 from experiments.shape_reconstruction.prior.surface import predict_surface
 from experiments.shape_reconstruction.reconstruct import reconstruct, reconstruct_with_prior
 from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.smooth.stated_space import require_stated_size, require_stated_space
-from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import read_only
 from harness.basics.errors import FitRefused, OutOfDomain
 from harness.basics.geometry import frame_facing, transform

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from experiments.shape_reconstruction.surface import ShapeEstimate
+from experiments.shape_reconstruction.fits import ShapeEstimate
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused, OutOfDomain
 from harness.basics.faces.nearest_kernels import shares_on_faces

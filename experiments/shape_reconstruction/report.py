@@ -7,11 +7,11 @@ import numpy as np
 
 from experiments.shape_reconstruction.answer import ScoredShape, ShapeAnswer
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.explore.running import live_estimates, live_method
+from experiments.shape_reconstruction.explore.explorer import live_estimates, live_method
+from experiments.shape_reconstruction.fits import SEEN, TOUCHED, ShapeEstimate
 from experiments.shape_reconstruction.metric import band_held, shape_error, surfaces_apart
 from experiments.shape_reconstruction.result import stem_of, true_surface
 from experiments.shape_reconstruction.section import ShapeRun
-from experiments.shape_reconstruction.surface import SEEN, TOUCHED, ShapeEstimate
 from harness.basics.mesh import Mesh
 from harness.bench.device import Health
 from harness.experiment.compare import Comparison

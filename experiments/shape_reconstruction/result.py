@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from experiments.shape_reconstruction.answer import SENSES, ScoredShape, ShapeAnswer
+from experiments.shape_reconstruction.answer import SENSES, ScoredShape, ShapeAnswer, base_from_stand
+from experiments.shape_reconstruction.fits import SEEN, TOUCHED, ShapeEstimate
 from experiments.shape_reconstruction.methods import METHOD
 from experiments.shape_reconstruction.metric import published_chamfer, shape_error
-from experiments.shape_reconstruction.readings import base_from_stand
 from experiments.shape_reconstruction.section import ShapeRun
-from experiments.shape_reconstruction.surface import SEEN, TOUCHED, ShapeEstimate
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import DataRefused, FitRefused
 from harness.basics.geometry import apply, inverse, rotation_about, transform

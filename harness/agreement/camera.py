@@ -17,8 +17,7 @@ from harness.agreement.subject import Subject
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import DataRefused
 from harness.basics.geometry import apply, rotation_from_vector
-from harness.basics.mesh import Mesh
-from harness.basics.mesh_hull import hull_of
+from harness.basics.mesh import Mesh, hull_of
 from harness.bench.instruments.cameras import CameraSection
 from harness.picture.camera_errors import CameraErrors
 from harness.picture.object_mask import overlap

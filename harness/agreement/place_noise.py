@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.basics.arrays import FloatArray
-from harness.bench.bench_errors import USUAL, BenchErrors
+from harness.bench.gap import USUAL, BenchErrors
 
 SHARED = 13
 """Object's place (3), rotation (3) and size, gel's centre (3) and attitude (3), each over its sigma."""

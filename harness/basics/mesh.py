@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from harness.basics.arrays import FloatArray, IntArray, read_only
 
@@ -75,3 +76,23 @@ def _divide(vectors: FloatArray, lengths: FloatArray) -> FloatArray:
     safe = np.where(lengths > 0.0, lengths, 1.0)
     quotient: FloatArray = vectors / safe[:, None]
     return quotient
+
+
+def hull_of(points: FloatArray) -> FloatArray:
+    """``(m, d)`` those of ``(n, d)`` points that span their convex hull; all of a flat set."""
+    try:
+        return points[ConvexHull(points - points[0]).vertices]
+    except QhullError:
+        return np.unique(points, axis=0)
+
+
+def closed_hull(points: FloatArray) -> Mesh:
+    """The convex hull of ``(n, 3)`` points, its faces looking outward."""
+    hull = ConvexHull(points - points[0])
+    used, faces = np.unique(hull.simplices, return_inverse=True)
+    faces = faces.reshape(hull.simplices.shape)
+    corners = points[used][faces]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inside = np.einsum("ij,ij->i", outward, hull.equations[:, :3]) < 0.0
+    faces[inside] = faces[inside][:, ::-1]
+    return Mesh(points[used], faces)

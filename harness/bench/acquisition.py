@@ -31,8 +31,8 @@ from harness.bench.acquisition_channels import (
     SHORTEST_REST,
     judge,
 )
+from harness.bench.device import Reading
 from harness.bench.microphone_take import take_of
-from harness.bench.reading import Reading
 
 _STEADY = 1e-4
 _FAR = 6.0

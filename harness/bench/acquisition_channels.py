@@ -7,7 +7,7 @@ import numpy as np
 from harness.basics.arrays import AnyArray
 from harness.basics.clipping import is_clipped
 from harness.basics.rest_level import coarse_rest
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Reading
 
 FORCE = "hammer.force"
 PRESSURE = "microphone.pressure"

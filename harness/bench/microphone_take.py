@@ -8,7 +8,7 @@ import numpy as np
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused
 from harness.bench.acquisition_channels import PRESSURE, block_channel
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Reading
 
 FLAGS = "microphone.flags"
 CLOCK = "microphone.clock"

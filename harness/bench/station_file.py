@@ -11,7 +11,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import apply
 from harness.basics.toml_file import StrictModel, load_toml, validate
-from harness.bench.bench_errors import USUAL, BenchErrors
+from harness.bench.gap import USUAL, BenchErrors
 from harness.bench.instruments.arm import ArmSection
 from harness.bench.instruments.cameras import CameraSection, GelSection
 from harness.bench.instruments.section import InstrumentSection, Placement, section_of_kind

@@ -10,8 +10,8 @@ from harness.commands import options
 
 if TYPE_CHECKING:
     from harness.effects.touch_press import Press
+    from harness.sim.gel.contact_force import ForceTable
     from harness.sim.gel.elastic import GelElastic
-    from harness.sim.gel.force_table import ForceTable
 
 Force = Annotated[
     bool,
@@ -87,7 +87,7 @@ def stiffness(modulus: str | None, share: str | None, poisson: float | None) -> 
 
 def measured(table: Path | None, levels: list[str]) -> "tuple[ForceTable | None, list[str]]":
     """The table of forces, and the levels, with the one that reads it where no other is chosen."""
-    from harness.sim.gel.force_table import read_force_table
+    from harness.sim.gel.contact_force import read_force_table
 
     if table is None:
         return None, levels

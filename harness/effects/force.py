@@ -6,9 +6,8 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.bench.sensor import TactileSensor
 from harness.effects.accuracy import Knob
-from harness.sim.gel.contact_force import PARTS, ContactForce, contact_force, require_depths
+from harness.sim.gel.contact_force import PARTS, ContactForce, ForceTable, contact_force, require_depths
 from harness.sim.gel.elastic import GelElastic
-from harness.sim.gel.force_table import ForceTable
 
 FORCE = Knob(
     "touch.force",

@@ -13,12 +13,11 @@ from harness.basics.mesh import Mesh
 from harness.bench.sensor import TactileSensor
 from harness.objectfile.file import ObjectFile
 from harness.picture.pinhole import DirectionalLight, Pinhole
-from harness.sim.gel.contact_force import ContactForce
+from harness.sim.gel.contact_force import ContactForce, ForceTable
 from harness.sim.gel.elastic import GelElastic
-from harness.sim.gel.force_table import ForceTable
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.gel.marker_file import MarkerFile
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.markers import MarkerFile
+from harness.sim.gel.press_pose import Presses
 from harness.sim.light.appearance import Appearance
 from harness.sim.light.direct_image import DirectImage, LitObject, VisibleSurface
 from harness.sim.optics.optics import TactileImages

@@ -11,8 +11,7 @@ from harness.objectfile.file import ObjectFile
 from harness.sim.modal.modal import ELEMENT_SHARE, HEARING, default_edge, from_arrays, modes_of, to_arrays
 from harness.sim.modal.modes import dampings
 from harness.sim.solid.walls import walled
-from harness.sim.sound.modal_radiation import radiation
-from harness.sim.sound.modal_sound import Strikes, ring
+from harness.sim.sound.modal_sound import Strikes, radiation, ring
 from harness.sim.sound.room import MicrophoneResponse, RoomField, as_heard, reverberated
 
 if TYPE_CHECKING:

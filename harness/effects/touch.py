@@ -18,12 +18,10 @@ from harness.effects.accuracy import Knob
 from harness.objectfile.file import ObjectFile
 from harness.sim.gel.gel import GelLevel, deform, over_range
 from harness.sim.gel.height_map import RasterMesh, height_maps, penetration, rest_surface
-from harness.sim.gel.marker_file import MarkerFile
-from harness.sim.gel.markers import INK, draw_markers, marker_displacements
-from harness.sim.gel.presses import Presses, presses_of
+from harness.sim.gel.markers import INK, MarkerFile, draw_markers, marker_displacements
+from harness.sim.gel.press_pose import Presses, presses_of
 from harness.sim.optics.optics import Optics, OpticsLevel, TactileImages, with_camera_noise
-from harness.sim.optics.shadow import ShadowTable
-from harness.sim.optics.shadow_image import darkened, darkening
+from harness.sim.optics.shadow import ShadowTable, darkened, darkening
 from harness.sim.optics.tactile_calibration import Float32Array, TactileCalibration
 from harness.sim.solid.walls import walled
 
@@ -184,7 +182,7 @@ def compute_darkening(
     sensor_shadow_table: ShadowTable,
     sensor_rest: FloatArray | None = None,
 ) -> tuple[Float32Array, FloatArray]:
-    """Compute how much shadows darken each picture, as ``harness.sim.optics.shadow_image.darkening``."""
+    """Compute how much shadows darken each picture, as ``harness.sim.optics.shadow.darkening``."""
     calibration, table = sensor_calibration, sensor_shadow_table
     return darkening(touch_colour, touch_height_map, touch_gel, sensor, calibration, table, sensor_rest)
 

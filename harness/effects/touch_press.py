@@ -26,7 +26,7 @@ from harness.objectfile.file import ObjectFile
 from harness.sim.gel.contact_force import ContactForce, pressed_of_gel
 from harness.sim.gel.gel import require_within_gel
 from harness.sim.gel.height_file import Heights
-from harness.sim.optics.pressed_gel import Gel
+from harness.sim.optics.known_gel import Gel
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
 _COLOUR = Effect("touch.colour", touch.select_colour)

@@ -10,7 +10,7 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import OutOfDomain
-from harness.bench.bench_errors import BenchErrors
+from harness.bench.gap import BenchErrors
 
 SIGMAS = 3.0
 """Standard deviations of a difference between two contacts within which they agree."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
-from harness.basics.faces.face_grid import FaceGrid, build_face_grid
+from harness.basics.faces.face_clusters import FaceGrid, build_face_grid
 from harness.basics.faces.nearest_kernels import near_surface, nearest_places, shares_on_faces
 from harness.basics.mesh import Mesh
 

@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from harness.basics.arrays import BoolArray, FloatArray, read_only
 from harness.basics.errors import DataRefused
-from harness.basics.mesh_hull import hull_of
+from harness.basics.mesh import hull_of
 
 DIRECTIONS = 72
 """In which the outline is read: one every five degrees."""

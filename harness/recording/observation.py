@@ -12,7 +12,7 @@ from harness.basics.geometry import rotation_from_quaternion, transform
 from harness.basics.resampling import resample
 from harness.bench.acquisition import AcquisitionCalibration, Strike, of_one_stream, strike_from_readings
 from harness.bench.acquisition_channels import FORCE
-from harness.bench.reading import Reading
+from harness.bench.device import Reading
 from harness.picture.square_pixels import made_square
 from harness.recording.step_file import StepRecord
 

@@ -21,8 +21,8 @@ from harness.basics.files.foreign_file import MOST_JSON, read_bounded
 from harness.basics.files.json_file import CHECKSUM, checksum_of, parse_strictly
 from harness.basics.files.lock_file import hold_folder
 from harness.basics.whole_file import make_folder, write_text_whole
+from harness.bench.device import Reading
 from harness.bench.named_files import require_run
-from harness.bench.reading import Reading
 from harness.recording.step_file import Step, StepRecord, read_step, read_wall_span, write_step
 
 SCHEMA = 3

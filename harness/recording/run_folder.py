@@ -37,8 +37,8 @@ from harness.recording.observation import Observation, look_pictures, observe_st
 from harness.recording.recording import HEADER, IN_USE, STEPS, Recording, RunHeader, require_unused
 from harness.recording.step_file import StepRecord
 from harness.sim.optics.inverse import GelReader
+from harness.sim.optics.known_gel import require_own
 from harness.sim.optics.lit_calibration import named_calibration, read_calibration, shadow_of
-from harness.sim.optics.pressed_gel import require_own
 from harness.sim.optics.tactile_calibration import TactileCalibration, save_calibration
 
 OBJECT, CALIBRATION, ACQUISITION = "object.npz", "calibration.npz", "acquisition.json"

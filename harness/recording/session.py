@@ -8,7 +8,7 @@ from types import FrameType
 from typing import Protocol, TypeVar
 
 from harness.basics.clock import now
-from harness.bench.reading import Reading
+from harness.bench.device import Reading
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step
 

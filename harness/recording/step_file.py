@@ -32,7 +32,7 @@ from harness.basics.arrays import AnyArray
 from harness.basics.errors import RecordingDamaged
 from harness.basics.whole_file import write_bytes_whole
 from harness.bench.acquisition_channels import FORCE, PRESSURE
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Reading
 from harness.picture.image_file import decode_jpeg, require_modest_picture
 
 

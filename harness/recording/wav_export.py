@@ -17,7 +17,7 @@ from harness.basics.errors import DataRefused
 from harness.basics.wav import write_pcm
 from harness.basics.whole_file import write_text_whole
 from harness.bench.acquisition_channels import FORCE, PRESSURE
-from harness.bench.reading import Reading
+from harness.bench.device import Reading
 from harness.recording.recording import Recording
 
 SCHEMA = 1

@@ -9,8 +9,7 @@ from typing import Any
 
 from harness.bench import microphone_take
 from harness.bench.acquisition_channels import CLOCK, FLAGS, FORCE, PRESSURE
-from harness.bench.device import Health
-from harness.bench.reading import Reading
+from harness.bench.device import Health, Reading
 from harness.effects.explain import NetworkInUse, networks_at
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import AnyExperiment, AnyScored

@@ -16,9 +16,8 @@ from harness.skills.sites import PressLimits, Site, plan_sites
 from harness.skills.strike import StrikeMotion, planner
 from harness.twin.bench import TwinBench
 from harness.twin.bench_of import twin_of
-from harness.twin.motion import PlannedContact, plan_contact, reachable
+from harness.twin.motion import PlannedContact, PlannedStrike, StrikePlanner, plan_contact, reachable
 from harness.twin.rehearsal import RehearsalReport, Segment, rehearse
-from harness.twin.strike_motion import PlannedStrike, StrikePlanner
 
 HOME = np.radians([0.0, -90.0, 60.0, -60.0, -90.0, 0.0])
 """rad: the gel above and behind the object, pointing down; where the first travel starts."""

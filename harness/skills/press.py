@@ -20,8 +20,7 @@ import numpy as np
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault, MotionEnded, NotTouched
 from harness.basics.geometry import transform
-from harness.bench.device import HAMMER, Arm
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import HAMMER, Arm, Channel, Reading
 from harness.bench.station import PRESS, Bench
 from harness.bench.travel import Trajectory, travel
 from harness.recording.recording import Recording

@@ -14,15 +14,14 @@ import numpy as np
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault, WrongUse
 from harness.basics.geometry import quaternion_from_rotation, translation
-from harness.bench.device import HAMMER, MICROPHONE
-from harness.bench.listening import capture
+from harness.bench.device import HAMMER, MICROPHONE, Channel, Reading
+from harness.bench.instruments.sound import capture
 from harness.bench.microphone_take import BAD, take_of
-from harness.bench.reading import Channel, Reading
 from harness.bench.scene import SceneFile
 from harness.bench.station import STRIKE, Bench
 from harness.bench.station_file import Station
 from harness.twin.bench import TwinBench
-from harness.twin.strike_motion import PlannedStrike, StrikePlanner
+from harness.twin.motion import PlannedStrike, StrikePlanner
 
 _LOG = logging.getLogger(__name__)
 

@@ -16,7 +16,7 @@ from harness.objectfile.audio.blow import HammerBlow, hammer, hammered
 from harness.objectfile.audio.sound_wav import BITS, wav_rate, write_wav
 from harness.objectfile.audio.strike import Place, StruckSound, place_near, place_of_vertex, pushes, strike
 from harness.objectfile.file import ObjectFile
-from harness.sim.sound.modal_radiation import radiation
+from harness.sim.sound.modal_sound import radiation
 
 Three = tuple[float, float, float]
 

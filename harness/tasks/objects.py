@@ -24,7 +24,7 @@ from harness.objectfile.file import ObjectFile
 from harness.objectfile.published.entries import PublishedObject, open_either
 from harness.objectfile.verify.verify import verify
 from harness.sim.modal.modal import HEARING
-from harness.sim.modal.stage_seconds import cpu, wall
+from harness.sim.modal.solve import cpu, wall
 
 Part = TypeVar("Part")
 

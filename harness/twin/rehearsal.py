@@ -11,7 +11,7 @@ from harness.basics.errors import MotionRefused
 from harness.basics.geometry import apply, inverse
 from harness.bench import kinematics
 from harness.twin.bench import TwinBench
-from harness.twin.sweep import Blocked, line_poses, line_postures, sweep, sweep_postures
+from harness.twin.ways import Blocked, line_poses, line_postures, sweep, sweep_postures
 
 SINGULAR: Final = 0.04  # smallest singular value of the Jacobian that a line may pass
 NEARLY_SINGULAR: Final = 0.1  # below this the report warns

@@ -204,7 +204,7 @@ def _cross(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
 def _first_hit(corners: FloatArray, start: FloatArray, direction: FloatArray) -> float:
     """Moeller and Trumbore, J. Graphics Tools 2(1), 1997; from either side.
 
-    Not by ``harness.basics.faces.ray_triangle``: its sums are those of ``np.dot``, another rounding, and
+    Not by ``harness.basics.faces.ray_mesh``: its sums are those of ``np.dot``, another rounding, and
     rehearsed contacts are written with these.
     """
     first, p, q = np.inf, np.empty(3), np.empty(3)
@@ -232,7 +232,7 @@ def _first_hit(corners: FloatArray, start: FloatArray, direction: FloatArray) ->
 def _nearest(corners: FloatArray, point: FloatArray) -> FloatArray:
     """Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
 
-    By the weights of corners, which is up to a rounding away from ``harness.basics.faces.nearest``; rehearsed
+    By the weights of corners, which is up to a rounding away from ``basics.faces.nearest_surface``; rehearsed
     contacts are written with these.
     """
     best, best_gap = corners[0, 0].copy(), np.inf

@@ -8,9 +8,8 @@ import numpy as np
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import BenchFault, LimitExceeded
 from harness.basics.geometry import quaternion_from_rotation, rotation_from_vector, vector_from_rotation
-from harness.bench.device import ArmState, Health
+from harness.bench.device import ArmState, Channel, Health, Reading
 from harness.bench.kinematics import forward, nearest_branch
-from harness.bench.reading import Channel, Reading
 from mocks.ur.arm.motions import trapezoid
 from mocks.world.world import World
 

@@ -7,9 +7,8 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.bench.acquisition_channels import BLOCK, CaptureForm, readings_of_capture
-from harness.bench.device import Health
+from harness.bench.device import Health, Reading
 from harness.bench.instruments.sound import HammerSection
-from harness.bench.reading import Reading
 from mocks.daq.strike_counts import SKEW, StrikeCounts
 from mocks.in_process.arm import InProcessArm, Stage
 

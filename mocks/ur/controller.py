@@ -8,11 +8,10 @@ from collections.abc import Callable, Mapping
 from enum import IntEnum
 from typing import Any, Final
 
-from mocks.ur.arm.force_sensor import NO_WRENCH
 from mocks.ur.arm.mover import PROGRAM_STOP, MotionFault
 from mocks.ur.functions import Functions
 from mocks.ur.hooks import CYCLE, ContactModel, ControllerConfig, OnCycle, OnOutputs
-from mocks.ur.robot import FORCE_LIMIT, Robot, RobotMode, SafetyMode
+from mocks.ur.robot import FORCE_LIMIT, NO_WRENCH, Robot, RobotMode, SafetyMode
 from mocks.ur.urscript.process import Process
 from mocks.ur.urscript.program import Program, translate
 from mocks.ur.urscript.values import ScriptError

@@ -43,7 +43,7 @@ configurable 8 to 15, tool 16 and 17."""
 
 
 class Cue(Protocol):
-    """A fault to begin; ``mocks.ur.faults`` lists the kinds."""
+    """A fault to begin; ``mocks.ur.serve`` lists the kinds."""
 
     @property
     def kind(self) -> str:

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from mocks.ur.controller import Controller, RuntimeState
 from mocks.ur.robot import SafetyMode
-from mocks.ur.urscript.tokens import whole_length
+from mocks.ur.urscript.program import whole_length
 from mocks.ur.urscript.values import ScriptError
 
 

@@ -26,7 +26,7 @@ from harness.sim.modal.solve import Elasticity
 from harness.sim.solid.surface_measure import wall_thickness
 from harness.sim.solid.tetrahedra import Tetrahedra, signed_volumes, tetrahedra, tetrahedralize
 from harness.sim.solid.walls import walled
-from harness.sim.sound.modal_radiation import radiation
+from harness.sim.sound.modal_sound import radiation
 from mocks.world.gap_draw import GapDraw
 from mocks.world.sound import SoundDraw, SoundingObject
 from mocks.world.world import World

@@ -13,9 +13,9 @@ from harness.bench.gap import GelGap
 from harness.bench.sensor import TactileSensor
 from harness.sim.gel.gel import R15_SKIRT, GelSkirt, deform, half_kernel, over_range
 from harness.sim.gel.height_map import RasterMesh, height_maps, rest_surface
+from harness.sim.optics.known_gel import require_own
 from harness.sim.optics.lit_calibration import named_calibration
 from harness.sim.optics.optics import Optics
-from harness.sim.optics.pressed_gel import require_own
 
 _FAR = 0.5e-3
 """Metres of gap that count as none: the jump from an object's outline to nothing must not ring."""

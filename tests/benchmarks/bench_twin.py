@@ -19,7 +19,7 @@ from harness.objects.household import build
 from harness.twin.bench import TwinBench
 from harness.twin.motion import PlannedContact, plan_contact, reachable
 from harness.twin.rehearsal import rehearse
-from harness.twin.sweep import sweep
+from harness.twin.ways import sweep
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell
 

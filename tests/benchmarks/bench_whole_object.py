@@ -29,7 +29,7 @@ from harness.experiment.subjects import REAL
 from harness.objects.builtin import BUILTIN
 from harness.objects.household import MATERIALS
 from harness.sim.modal.modal import default_edge
-from harness.sim.modal.stage_seconds import cpu, wall
+from harness.sim.modal.solve import cpu, wall
 from harness.sim.solid.surface_source import surface_of
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell

@@ -18,7 +18,7 @@ from harness.sim.gel.gel import R15_SKIRT, deform, skirt_for
 from harness.sim.gel.height_file import Heights, given_heights
 from harness.sim.gel.height_map import RasterMesh, height_maps
 from harness.sim.gel.press_pose import contact_place, gel_from_object
-from harness.sim.optics.pressed_gel import Gel
+from harness.sim.optics.known_gel import Gel
 from harness.sim.optics.shadow import ShadowTable
 from harness.sim.optics.tactile_calibration import shipped_calibration
 

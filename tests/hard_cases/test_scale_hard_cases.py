@@ -8,7 +8,7 @@ import pytest
 from experiments.scale_estimation.size import Belief, SizeRange, fused
 from experiments.scale_estimation.sound.hearing import Hearing, MaterialGuess, by_sound
 from experiments.scale_estimation.sound.peaks import RingingModel
-from experiments.scale_estimation.touch.patch import POINTS, Patch
+from experiments.scale_estimation.touch.fit import POINTS, Patch
 from experiments.scale_estimation.touch.touch import DOUBTED, by_touch
 from experiments.scale_estimation.vision.vision import by_sight, stands_seen
 from harness.basics.arrays import FloatArray

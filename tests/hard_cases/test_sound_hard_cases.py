@@ -11,8 +11,7 @@ import pytest
 from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.plan import plan_contacts
-from experiments.contact_localization.posterior.dials import Senses
-from experiments.contact_localization.posterior.estimate import Estimate
+from experiments.contact_localization.posterior.estimate import Estimate, Senses
 from experiments.contact_localization.posterior.strike_consistency import doubts_of_sound
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused

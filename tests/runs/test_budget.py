@@ -11,7 +11,7 @@ from experiments.contact_localization.accuracy.benchmark_runs import Case, cells
 from experiments.contact_localization.accuracy.budget import shipped_curve
 from experiments.contact_localization.answer import ESTIMATOR, PROGRAM
 from experiments.contact_localization.experiment import EXPERIMENT
-from experiments.contact_localization.posterior.dials import METHOD, SPACING
+from experiments.contact_localization.posterior.estimate import METHOD, SPACING
 from experiments.contact_localization.settings import (
     FINEST,
     KNOBS,

@@ -5,7 +5,7 @@ import pytest
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Reading
 from harness.skills.press import first_touch
 
 AXIS = np.array([0.0, 0.6, -0.8])

@@ -11,14 +11,14 @@ import pytest
 from drivers.ur.session import lock_path, remove_ownerless, take_arm
 from harness.basics.errors import BenchFault
 from harness.basics.files import lock_file
-from harness.basics.files.owned_folder import OwnedFolder
+from harness.bench.mock_lab import OwnedFolder
 
 ADDRESS = "127.9.8.7"
 OWNER = """
 import sys, time
 from pathlib import Path
 from drivers.ur.session import take_arm
-from harness.basics.files.owned_folder import OwnedFolder
+from harness.bench.mock_lab import OwnedFolder
 parent = Path(sys.argv[1])
 folder = OwnedFolder("touchstone-lab-", parent)
 (folder.path / "lab.log").write_text("ready")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import BenchFault, NotTouched, WrongUse
-from harness.bench.reading import Reading
+from harness.bench.device import Reading
 from harness.bench.station import Bench
 from harness.bench.station_file import load_station, station_path
 from harness.cli import invoke

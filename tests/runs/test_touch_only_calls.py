@@ -23,7 +23,7 @@ OF_SOUND = (
     "harness.bench.acquisition",
     "harness.sim.sound.room",
     "harness.sim.modal.modal",
-    "harness.sim.modal.lanczos",
+    "harness.sim.modal.solve",
     "harness.sim.solid.modal_mesh",
     "harness.sim.sound.modal_sound",
     "harness.sim.modal.system",

@@ -11,7 +11,7 @@ from calibration.taxim.mark_free import Identity, calibration_of
 from calibration.taxim.pictures import Pictures, PressPack
 from calibration.taxim.smooth_fit import changes
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
-from harness.sim.optics.inverse_error import HeightErrors
+from harness.sim.optics.depth_reading import HeightErrors
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
 R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)

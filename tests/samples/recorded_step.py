@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from harness.bench.acquisition_channels import FORCE
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Reading
 from harness.picture.image_file import decode_jpeg
 from harness.recording.recording import RunHeader
 from harness.recording.step_file import Step, StepRecord

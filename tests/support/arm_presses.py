@@ -5,11 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from calibration.taxim.arm.plan import PressSettings
-from calibration.taxim.arm.session import BALL, ball_scene, procedure
+from calibration.taxim.arm.press import BALL, ball_scene, procedure
 from harness.basics.arrays import ByteArray, FloatArray
-from harness.bench.device import Health, TactileCamera
+from harness.bench.device import Health, Reading, TactileCamera
 from harness.bench.gap import gap_path, load_gap
-from harness.bench.reading import Reading
 from harness.bench.station import Bench
 from harness.bench.station_file import load_station, station_path
 from harness.experiment import begin, perform

@@ -8,12 +8,10 @@ from experiments.shape_reconstruction.family.field import corners_of, grid_dista
 from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.kinds import draw_shape
-from experiments.shape_reconstruction.family.minimize import PriorRows
 from experiments.shape_reconstruction.family.posterior import Mixture
-from experiments.shape_reconstruction.family.search import Hypothesis
-from experiments.shape_reconstruction.fits import FamilyFit
-from experiments.shape_reconstruction.surface import TOUCHED, UNOBSERVED
-from harness.basics.faces.isosurface import isosurface
+from experiments.shape_reconstruction.family.search import Hypothesis, PriorRows
+from experiments.shape_reconstruction.fits import TOUCHED, UNOBSERVED, FamilyFit
+from experiments.shape_reconstruction.smooth.grid import isosurface
 from harness.basics.mesh import Mesh
 
 SHAPES = ("mug", "bowl", "tray", "bottle", "spanner")

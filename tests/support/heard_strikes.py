@@ -6,7 +6,7 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray
 from harness.bench.acquisition import Strike, strike_from_readings
-from harness.bench.reading import Reading
+from harness.bench.device import Reading
 from harness.bench.station import Bench
 from harness.bench.station_file import Station
 from harness.recording.step_file import Step

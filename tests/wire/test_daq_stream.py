@@ -10,7 +10,7 @@ from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import BenchFault, WrongUse
 from harness.bench.acquisition import strike_from_readings
 from harness.bench.acquisition_channels import BLOCK, CLOCK, FLAG_FIELDS, FLAGS, FORCE, PRESSURE
-from harness.bench.reading import Reading
+from harness.bench.device import Reading
 from mocks.daq.strike_counts import Wiring, skewed
 from tests.support.daq_bench import (
     CALIBRATION,

@@ -18,8 +18,8 @@ import pytest
 from experiments.contact_localization.plan import plan_contacts
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_from_quaternion, transform
+from harness.bench.device import Reading
 from harness.bench.gap import load_gap
-from harness.bench.reading import Reading
 from harness.bench.scene import SceneFile
 from harness.bench.station import Bench, RunContext, open_station
 from harness.bench.station_file import Station

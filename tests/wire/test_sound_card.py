@@ -18,8 +18,8 @@ from drivers.microphone.microphone import PortAudioMicrophone
 from harness.basics.arrays import AnyArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
+from harness.bench.device import Reading
 from harness.bench.microphone_take import BAD, UNSURE, UNTRIGGERED, flags_of
-from harness.bench.reading import Reading
 from mocks.sound_card.card import SoundCard, why_not
 
 pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not() or "a sound card can be mocked here")

@@ -16,9 +16,8 @@ from harness.basics.geometry import rotation_from_quaternion, transform
 from harness.basics.mesh import Mesh
 from harness.bench.acquisition import strike_from_readings
 from harness.bench.acquisition_channels import CLOCK, FLAGS, FORCE, PRESSURE
-from harness.bench.device import HAMMER
+from harness.bench.device import HAMMER, Reading
 from harness.bench.named_files import SHIPPED
-from harness.bench.reading import Reading
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import STRIKE, Bench, RunContext, open_station
 from harness.bench.station_file import Station, load_station

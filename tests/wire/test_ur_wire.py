@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mocks.ur.variables import OUTPUTS
+from mocks.ur.rtde_server import OUTPUTS
 from tests.support.ur_process import PORTS, UrProcess, is_free, wait_until
 
 ROOT = str(Path(__file__).resolve().parents[2])

@@ -12,8 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.stats import qmc
 
-from calibration.taxim.arm.settled import Stillness
-from calibration.taxim.arm.touch_down import PICTURES
+from calibration.taxim.arm.touch_down import PICTURES, Stillness
 from calibration.taxim.gates import LEAST_PRESSES
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse

@@ -13,14 +13,13 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from calibration.taxim.arm.moves import ArmScale, arm_scale
-from calibration.taxim.arm.settled import look
-from calibration.taxim.arm.touch_down import touch_downs
+from calibration.taxim.arm.touch_down import look, touch_downs
 from calibration.taxim.pictures import Pictures, PressPack, Refused, set_digest
 from calibration.taxim.smooth_fit import distance
 from harness.basics.arrays import ByteArray, FloatArray, block_means, read_only
 from harness.basics.errors import CalibrationRefused, RecordingDamaged
 from harness.basics.geometry import apply, inverse, rotation_from_quaternion, transform
-from harness.bench.reading import Reading
+from harness.bench.device import Reading
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord

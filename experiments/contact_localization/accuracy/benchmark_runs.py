@@ -26,8 +26,7 @@ from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.model import Prior
 from experiments.contact_localization.plan import plan_contacts
 from experiments.contact_localization.posterior.baselines import mean_random_error
-from experiments.contact_localization.posterior.dials import needs_images
-from experiments.contact_localization.posterior.estimate import Estimate
+from experiments.contact_localization.posterior.estimate import Estimate, needs_images
 from experiments.contact_localization.posterior.policy import Readings
 from experiments.contact_localization.settings import HEARD
 from harness.basics.arrays import FloatArray

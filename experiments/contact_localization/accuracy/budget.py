@@ -17,9 +17,8 @@ from experiments.contact_localization.answer import (
 )
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.dials import SPACING, needs_images
-from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.posterior.noise import noise_at
+from experiments.contact_localization.posterior.estimate import SPACING, Estimate, needs_images
+from experiments.contact_localization.posterior.likelihood import noise_at
 from experiments.contact_localization.posterior.policy import Readings, read
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.section import Localization

@@ -21,9 +21,15 @@ from experiments.contact_localization.posterior.baselines import (
     mfcc_filter,
     without_images,
 )
-from experiments.contact_localization.posterior.dials import METHOD, PARTICLES, SENSES, SPACING, needs_images
-from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.posterior.noise import noise_at
+from experiments.contact_localization.posterior.estimate import (
+    METHOD,
+    PARTICLES,
+    SENSES,
+    SPACING,
+    Estimate,
+    needs_images,
+)
+from experiments.contact_localization.posterior.likelihood import noise_at
 from experiments.contact_localization.posterior.policy import Readings
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.settings import (

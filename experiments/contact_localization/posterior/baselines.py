@@ -11,16 +11,15 @@ import numpy as np
 from scipy.fft import dct, rfft, rfftfreq
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.likelihood import GeometryNoise
-from experiments.contact_localization.posterior.noise import Noise
-from experiments.contact_localization.posterior.particle import Particles, filtered
+from experiments.contact_localization.posterior.estimate import Particles, filtered
+from experiments.contact_localization.posterior.likelihood import GeometryNoise, Noise
 from experiments.contact_localization.posterior.posterior import best_point
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.sound.gains import GainTable
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import AnyArray, FloatArray, IntArray, read_only
 from harness.basics.errors import WrongUse
-from harness.basics.faces.nearest import nearest_point
+from harness.basics.faces.nearest_surface import nearest_point
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
 from harness.bench.acquisition import Strike

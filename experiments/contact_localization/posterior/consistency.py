@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
-from experiments.contact_localization.posterior.noise import SAME_AXIS, SAME_PLACE
+from experiments.contact_localization.posterior.likelihood import SAME_AXIS, SAME_PLACE
 from experiments.contact_localization.posterior.search import Search
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import FitRefused

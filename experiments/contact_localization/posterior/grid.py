@@ -7,7 +7,7 @@ from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
 
 from experiments.contact_localization.posterior.hypotheses import Hypotheses, best_of, normalised, systematic
-from experiments.contact_localization.posterior.noise import UNKNOWNS, log_prior
+from experiments.contact_localization.posterior.likelihood import UNKNOWNS, log_prior
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.posterior.strikes import StrikeEvidence
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray

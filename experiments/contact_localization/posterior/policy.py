@@ -5,19 +5,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.dials import (
+from experiments.contact_localization.posterior.estimate import (
     BLOCK,
     METHOD,
     ROUNDS,
     SAMPLES,
     SPACING,
+    Estimate,
+    locate,
     needs_images,
 )
-from experiments.contact_localization.posterior.estimate import Estimate, locate
-from experiments.contact_localization.posterior.noise import noise_at
+from experiments.contact_localization.posterior.likelihood import noise_at
 from experiments.contact_localization.touch.touch import Contact, contact_of
 from harness.basics.errors import FitRefused
-from harness.bench.bench_errors import BenchErrors
+from harness.bench.gap import BenchErrors
 from harness.effects.accuracy import Accuracy
 from harness.recording.observation import Observation
 from harness.sim.optics.inverse import GelReader, GelReading

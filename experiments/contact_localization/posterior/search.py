@@ -12,17 +12,19 @@ import numpy as np
 
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.hypotheses import Hypotheses, best_of
-from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores, possible_anchors
-from experiments.contact_localization.posterior.noise import (
+from experiments.contact_localization.posterior.likelihood import (
     Noise,
+    arrange,
     contact_scales,
+    geometry_scores,
     log_prior,
     moves,
     place_noise,
+    possible_anchors,
 )
 from experiments.contact_localization.touch.touch import Contact, TouchMap, best_fit, touch_terms
 from harness.basics.arrays import FloatArray, IntArray
-from harness.bench.bench_errors import USUAL
+from harness.bench.gap import USUAL
 from harness.sim.gel.view import ToolView, view_along, view_of
 from harness.sim.solid.surface_samples import Surface
 

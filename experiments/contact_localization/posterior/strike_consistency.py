@@ -6,8 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.contact_localization.posterior.hypotheses import Hypotheses, anchors
-from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores
-from experiments.contact_localization.posterior.noise import SAME_AXIS, SAME_PLACE
+from experiments.contact_localization.posterior.likelihood import (
+    SAME_AXIS,
+    SAME_PLACE,
+    arrange,
+    geometry_scores,
+)
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.posterior.strikes import ANCHORS, StrikeEvidence, strike_places
 from harness.basics.arrays import FloatArray, IntArray

@@ -10,16 +10,16 @@ from experiments.contact_localization.answer import PROGRAM, Answer, ScoredConta
 from experiments.contact_localization.answer import Answer as Found
 from experiments.contact_localization.next_contact import EXPECTED
 from experiments.contact_localization.posterior.consistency import Gate
-from experiments.contact_localization.posterior.dials import (
+from experiments.contact_localization.posterior.estimate import (
     DIALS,
     METHOD,
     PARTICLES,
     ROUNDS,
     SAMPLES,
+    Estimate,
     Senses,
 )
-from experiments.contact_localization.posterior.dials import SENSES as BY
-from experiments.contact_localization.posterior.estimate import Estimate
+from experiments.contact_localization.posterior.estimate import SENSES as BY
 from experiments.contact_localization.report.result import by_translations, flags_of, true_points
 from experiments.contact_localization.report.sound_report import posterior_of, sound_of
 from experiments.contact_localization.section import Localization

@@ -8,8 +8,7 @@ import numpy as np
 from experiments.contact_localization.answer import Answer, ScoredContact
 from experiments.contact_localization.posterior.baselines import mean_random_error, without_images
 from experiments.contact_localization.posterior.consistency import Gate
-from experiments.contact_localization.posterior.dials import SPACING
-from experiments.contact_localization.posterior.estimate import Estimate
+from experiments.contact_localization.posterior.estimate import SPACING, Estimate
 from experiments.contact_localization.posterior.strike_consistency import doubts_of_sound
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused

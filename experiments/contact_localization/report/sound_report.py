@@ -7,8 +7,7 @@ import numpy as np
 from scipy.fft import rfft, rfftfreq
 
 from experiments.contact_localization.answer import Answer, ScoredContact
-from experiments.contact_localization.posterior.dials import SPACING
-from experiments.contact_localization.posterior.estimate import Estimate
+from experiments.contact_localization.posterior.estimate import SPACING, Estimate
 from experiments.contact_localization.posterior.strikes import StrikeEvidence, hear
 from experiments.contact_localization.report.result import true_points
 from harness.basics.arrays import FloatArray, read_only
@@ -18,8 +17,7 @@ from harness.bench.acquisition import Strike
 from harness.report.data import PeakLine, SenseAnswer, Sound, SpectrogramPair, StrikeLine
 from harness.report.values import Missing, Posterior
 from harness.sim.modal.modes import Modes, dampings
-from harness.sim.sound.modal_radiation import radiation
-from harness.sim.sound.modal_sound import ring
+from harness.sim.sound.modal_sound import radiation, ring
 from harness.strikes.spectra import Analysis
 
 NOT_STRUCK = "not struck"

@@ -13,8 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import logsumexp
 
-from experiments.contact_localization.sound.density import MOST_RANK, sound_scores
-from experiments.contact_localization.sound.gains import GainTable
+from experiments.contact_localization.sound.gains import MOST_RANK, GainTable, sound_scores
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.errors import WrongUse
 from harness.basics.materials import Material

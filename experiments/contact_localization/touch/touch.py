@@ -17,7 +17,7 @@ from experiments.contact_localization.touch.kernels import (
     terms_at,
 )
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
-from harness.bench.bench_errors import USUAL
+from harness.bench.gap import USUAL
 from harness.sim.gel.view import ToolView
 
 UPRIGHT: FloatArray = read_only(np.zeros(3))

@@ -12,7 +12,7 @@ from harness.basics.arrays import FloatArray, read_only
 from harness.basics.compiled import compiled
 from harness.basics.materials import Material
 from harness.sim.modal.modes import Modes, dampings
-from harness.sim.sound.modal_radiation import radiation
+from harness.sim.sound.modal_sound import radiation
 
 LISTENED_FROM = 0.5
 """M between object and microphone where nobody says: half as far is 6 dB, less than a place's own."""

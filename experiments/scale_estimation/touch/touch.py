@@ -11,11 +11,11 @@ from experiments.scale_estimation.size import Belief, SizeRange, add_unevenness
 from experiments.scale_estimation.touch.fit import (
     UNKNOWNS,
     FreeSpace,
+    Patch,
     Stand,
     TouchProblem,
     distinct_paths,
 )
-from experiments.scale_estimation.touch.patch import Patch
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 

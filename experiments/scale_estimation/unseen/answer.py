@@ -10,8 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from experiments.scale_estimation.size import Belief, SizeRange, fused
-from experiments.scale_estimation.touch.fit import USUAL_PLACE
-from experiments.scale_estimation.touch.patch import Patch
+from experiments.scale_estimation.touch.fit import USUAL_PLACE, Patch
 from experiments.scale_estimation.unseen import spectrogram
 from experiments.scale_estimation.unseen.contact_set import GelWay, imprint_features
 from experiments.scale_estimation.unseen.network import by_ways, shipped

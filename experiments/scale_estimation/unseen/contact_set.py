@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.scale_estimation.touch.patch import Patch
+from experiments.scale_estimation.touch.fit import Patch
 from harness.basics.arrays import FloatArray
 
 MOST = 16

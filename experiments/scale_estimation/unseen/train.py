@@ -8,13 +8,21 @@ torch: ``pip install '.[author]'``. Modes that were solved are kept, so that a r
 import argparse
 import json
 import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
-from experiments.scale_estimation.unseen.training.outlines import train_outlines
-from experiments.scale_estimation.unseen.training.real_shapes import train_real_shapes
+import numpy as np
+
+from experiments.scale_estimation.size import STEP, Belief, SizeRange
+from experiments.scale_estimation.unseen.network import by_ways
+from experiments.scale_estimation.unseen.regression import by_outline
+from experiments.scale_estimation.unseen.training.contact_samples import TouchableShape, contact_sample
+from experiments.scale_estimation.unseen.training.outlines import picture, train_outlines
+from experiments.scale_estimation.unseen.training.samples import SIZES, draw_size
 from harness.authoring.network_program import (
     chosen_networks,
     exit_code,
@@ -23,6 +31,26 @@ from harness.authoring.network_program import (
     write_network,
 )
 from harness.authoring.profiles import find_profile
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import DataRefused
+from harness.basics.mesh import Mesh, hull_of
+from harness.experiment.subjects import REAL
+from harness.sim.solid.mesh_read import read_mesh
+
+READINGS = 8
+"""Of every thing as it stands, and as it lies."""
+
+SIGMAS = tuple(0.02 * k for k in range(26))
+"""Of the size's logarithm, that are tried."""
+
+_KINDS = ("*.obj", "*.stl", "*.ply")
+_LEAST = 6
+_FLAT = 0.8
+"""Of the height of a thing as it stands: one that is no lower when it lies is not laid down."""
+
+Reading = tuple[Belief, float]
+"""What a sense says of an object, and its size in m."""
+
 
 NETWORKS = ("sound", "touch", "imprints")
 REAL_SHAPES = "real-shapes"
@@ -85,3 +113,96 @@ def _train(options: argparse.Namespace) -> None:
 
 if __name__ == "__main__":
     sys.exit(main())
+
+
+def meshes_in(folder: Path) -> list[Path]:
+    """Every mesh of a folder and those in it, but those that tables are measured on and collision hulls.
+
+    Raises:
+        DataRefused: too few.
+    """
+    tabled = {folder / Path(file).relative_to("meshes") for file, _, _ in REAL.values()}
+    found = sorted(path for kind in _KINDS for path in folder.rglob(kind))
+    found = [path for path in found if path not in tabled and "collision" not in path.name]
+    if len(found) < _LEAST:
+        raise DataRefused(f"{folder} holds {len(found)} meshes ({', '.join(_KINDS)}); {_LEAST} are needed")
+    return found
+
+
+def resting(mesh: Mesh) -> Iterator[Mesh]:
+    """One long, its lowest point on z = 0 below its middle: as in its file, and lying if that is lower."""
+    yield _standing(mesh.vertices, mesh)
+    lengths = np.ptp(mesh.bounds, axis=0)
+    if lengths.min() < _FLAT * lengths[2]:
+        order = np.roll([0, 1, 2], 2 - int(lengths.argmin()))  # an even permutation keeps it the same thing
+        yield _standing(mesh.vertices[:, order], mesh)
+
+
+def _standing(places: FloatArray, mesh: Mesh) -> Mesh:
+    low, high = places.min(axis=0), places.max(axis=0)
+    middle = np.array([*(0.5 * (low + high))[:2], low[2]])
+    return Mesh((places - middle) / (high - low).max(), mesh.faces)
+
+
+def readings(path: Path, seed: int) -> dict[str, list[Reading]]:
+    """Looks at a thing and explorations of it, as senses answer them where nobody knows its shape."""
+    raw, sizes = read_mesh(path), SizeRange(*SIZES)
+    found: dict[str, list[Reading]] = {"vision": [], "touch": []}
+    for way, mesh in enumerate(resting(Mesh(raw.vertices, raw.faces))):
+        random = np.random.default_rng((seed, way, 6))
+        shape, corners = TouchableShape(mesh), hull_of(mesh.vertices)
+        for _ in range(READINGS):
+            size = draw_size(random)
+            found["vision"].append((by_outline(*picture(corners, size, random), sizes), size))
+            found["touch"].append((by_ways(contact_sample(shape, size, random), sizes)[0], size))
+    return found
+
+
+def log_densities(read: Sequence[Reading]) -> FloatArray:
+    """``(n, SIGMAS)`` of the true size, were a deviation added to what is said."""
+    return np.array(
+        [[_log_density(belief.widened(sigma), size) for sigma in SIGMAS] for belief, size in read]
+    )
+
+
+def likeliest_sigma(densities: FloatArray) -> float:
+    """The deviation with which the true sizes are likeliest, of ``log_densities``."""
+    return SIGMAS[int(densities.mean(axis=0).argmax())]
+
+
+def _log_density(belief: Belief, size: float) -> float:
+    logs = belief.range.logs
+    return float(belief.log_density[round((np.log(size) - logs[0]) / STEP)])
+
+
+def _held(read: Sequence[Reading], sigma: float) -> float:
+    intervals = [(belief.widened(sigma).interval, size) for belief, size in read]
+    return round(float(np.mean([low <= size <= high for (low, high), size in intervals])), 3)
+
+
+def train_real_shapes(folder: Path, seed: int) -> dict[str, Any]:
+    """The deviation of each sense, and what its intervals hold on things that it was not found with."""
+    paths, per_thing = meshes_in(folder), []
+    for path in paths:
+        sys.stderr.write(f"real shapes: {path.name}\n")
+        per_thing.append(readings(path, seed))
+    found: dict[str, Any] = {"meshes": [str(path.relative_to(folder)) for path in paths]}
+    for sense in ("vision", "touch"):
+        found[sense] = _widths([one[sense] for one in per_thing])
+    return found
+
+
+def _widths(per_thing: Sequence[Sequence[Reading]]) -> dict[str, Any]:
+    densities = [log_densities(read) for read in per_thing]
+    left_out = [
+        _held(own, likeliest_sigma(np.concatenate([d for k, d in enumerate(densities) if k != row])))
+        for row, own in enumerate(per_thing)
+    ]
+    together = [reading for read in per_thing for reading in read]
+    return {
+        "sigma": round(likeliest_sigma(np.concatenate(densities)), 2),
+        "readings": len(together),
+        "held_before": _held(together, 0.0),
+        "held_left_out": round(float(np.mean(left_out)), 3),
+        "mean_error_cm": round(float(np.mean([1e2 * abs(b.size - s) for b, s in together])), 2),
+    }

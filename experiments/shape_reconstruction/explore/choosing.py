@@ -15,9 +15,8 @@ from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.rays import first_hit
-from experiments.shape_reconstruction.fits import FamilyFit
+from experiments.shape_reconstruction.fits import FamilyFit, ShapeEstimate
 from experiments.shape_reconstruction.section import Choice
-from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import frame_facing, rotation_about, transform

@@ -1,18 +1,22 @@
 """Plan the steps of a run: a camera image, then presses chosen one by one or planned on the CAD model."""
 
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
+from experiments.shape_reconstruction.answer import ShapeReadings
+from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.explore.choosing import CHOOSERS, aims_at_mask, lines_at_surface
-from experiments.shape_reconstruction.explore.running import RunningShape, live_method
-from experiments.shape_reconstruction.readings import ShapeReadings
-from experiments.shape_reconstruction.section import ShapeRun
-from experiments.shape_reconstruction.surface import ShapeEstimate
+from experiments.shape_reconstruction.family.search import CONTINUED
+from experiments.shape_reconstruction.fits import ShapeEstimate
+from experiments.shape_reconstruction.methods import QUICK, continued, estimated
+from experiments.shape_reconstruction.section import Choice, ShapeRun
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.errors import DataRefused, FitRefused, WrongUse
 from harness.basics.geometry import translation
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
@@ -23,8 +27,7 @@ from harness.picture.outline import SeenOutline, read_outline
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.skills.exploring.exploration import Exploration, kinds, press_into_unknown
-from harness.skills.exploring.lines import LINES, contact_along, lines_to
-from harness.skills.exploring.surroundings import Surroundings, end_of, nowhere
+from harness.skills.exploring.lines import LINES, Surroundings, contact_along, end_of, lines_to, nowhere
 from harness.skills.exploring.unknown_space import (
     SeenThing,
     UnknownStand,
@@ -37,6 +40,62 @@ from harness.skills.sites import PressLimits
 from harness.twin.bench import TwinBench
 from harness.twin.bench_of import twin_of, way_between
 from harness.twin.rehearsal import rehearse
+
+INFORMATIVE = "family, continued"
+"""While the arm waits for a press that goes by which shapes are likely."""
+
+
+class RunningShape:
+    """Estimates after one press more each time.
+
+    By ``INFORMATIVE`` each begins at the hypotheses of that before it and at a few draws of its own, from the
+    first press on, whichever are asked for: a run that is resumed, or replayed, goes where it went. Where
+    what is found fits ill, hypotheses before it may all be of a wrong form: it is begun anew beside them.
+
+    Args:
+        method: ``INFORMATIVE``, or a key of ``METHODS``, by which each estimate stands alone.
+    """
+
+    def __init__(self, method: str) -> None:
+        self._method = method
+        self._taken: int | None = None
+        self._found: ShapeEstimate | None = None
+
+    def after(self, evidence: ShapeEvidence) -> ShapeEstimate | None:
+        """From all presses of some evidence; None where they say too little.
+
+        Args:
+            evidence: that of the last call and as many presses or more.
+        """
+        presses = len(evidence.touches)
+        if presses != self._taken:
+            first = 0 if self._taken is None else self._taken + 1
+            for count in range(first if self._method == INFORMATIVE else presses, presses + 1):
+                self._found = self._next(replace(evidence, touches=evidence.touches[:count]))
+            self._taken = presses
+        return self._found
+
+    def _next(self, evidence: ShapeEvidence) -> ShapeEstimate | None:
+        try:
+            if self._method != INFORMATIVE:
+                return estimated(self._method, evidence)
+            settings = replace(CONTINUED, seed=len(evidence.touches))
+            return continued(evidence, settings, self._found)
+        except FitRefused:
+            return None
+
+
+MOST = 4
+"""Presses up to which each has an estimate of its own; of more, those at powers of two and the last."""
+
+
+@dataclass(frozen=True, eq=False)
+class LiveEstimate:
+    """What was known after a press."""
+
+    presses: int  #: how many were made by then.
+    evidence: ShapeEvidence  #: from them, and from the picture.
+    estimate: ShapeEstimate | None  #: None where they said too little for one.
 
 
 def steps_of(scene: SceneFile) -> int:
@@ -235,3 +294,29 @@ class ShapeExplorer:
             aims = aims_unseen(self.place, self._settings.place_error, UP_TO, first, random)
         lines = lines_to(aims, here, float(self.place[2]), random)
         return np.asarray(translation(-self.place) @ np.array(list(lines)))
+
+
+def live_method(choose: Choice) -> str:
+    """By which method the shape is estimated while the arm waits for its next press."""
+    return INFORMATIVE if choose == "active" else QUICK
+
+
+def live_estimates(evidence: ShapeEvidence, method: str) -> Iterator[LiveEstimate]:
+    """The estimates after some of a run's presses, in their order.
+
+    Args:
+        evidence: of the whole run.
+        method: as ``live_method`` names it.
+    """
+    running = RunningShape(method)
+    for count in counts_shown(len(evidence.touches)):
+        part = replace(evidence, touches=evidence.touches[:count])
+        yield LiveEstimate(count, part, running.after(part))
+
+
+def counts_shown(presses: int) -> list[int]:
+    """After which of so many presses."""
+    if presses <= MOST:
+        return list(range(1, presses + 1))
+    powers = [2**k for k in range(presses.bit_length()) if 2**k < presses]
+    return [*powers, presses]

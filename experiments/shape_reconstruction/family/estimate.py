@@ -23,15 +23,13 @@ from experiments.shape_reconstruction.family.field import corners_of, median_sur
 from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
-from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
-from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
-from experiments.shape_reconstruction.fits import FamilyFit
+from experiments.shape_reconstruction.family.search import LEVELS, FamilySearch, FamilySettings, Hypothesis
+from experiments.shape_reconstruction.fits import SEEN, TOUCHED, UNOBSERVED, FamilyFit
 from experiments.shape_reconstruction.smooth.contact_samples import all_samples
 from experiments.shape_reconstruction.smooth.free_space import silhouette_of
 from experiments.shape_reconstruction.smooth.knowledge import beyond_deviation, limited_sides
 from experiments.shape_reconstruction.smooth.knowledge import not_bounded as open_axes
 from experiments.shape_reconstruction.smooth.stated_space import longest_side, max_offset
-from experiments.shape_reconstruction.surface import SEEN, TOUCHED, UNOBSERVED
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.errors import FitRefused, OutOfDomain
 from harness.basics.geometry import apply, inverse

@@ -8,11 +8,11 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.fits import ShapeEstimate
 from experiments.shape_reconstruction.prior.network import require_silhouette, shipped
 from experiments.shape_reconstruction.smooth.free_space import Silhouette
 from experiments.shape_reconstruction.smooth.grid import BodySurface, Grid
 from experiments.shape_reconstruction.smooth.knowledge import known_by, limited_sides, not_bounded
-from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
 

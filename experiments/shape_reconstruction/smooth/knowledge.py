@@ -4,9 +4,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from experiments.shape_reconstruction import thresholds as limits
+from experiments.shape_reconstruction.fits import SEEN, TOUCHED, UNOBSERVED
 from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples
 from experiments.shape_reconstruction.smooth.free_space import Silhouette
-from experiments.shape_reconstruction.surface import SEEN, TOUCHED, UNOBSERVED
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.mesh import Mesh
 

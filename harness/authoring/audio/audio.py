@@ -25,7 +25,7 @@ from harness.objectfile.audio.table import scaled
 from harness.objectfile.graph import Nodes, Storage
 from harness.objectfile.runtime import Network
 from harness.sim.modal.modes import Modes
-from harness.sim.modal.stage_seconds import timed
+from harness.sim.modal.solve import timed
 from harness.sim.sound.modal_sound import audible
 from harness.sim.sound.synthesis import synthesize
 

@@ -21,7 +21,7 @@ from harness.objectfile.verify.verify import verify
 from harness.sim.modal.file import modes_of_file
 from harness.sim.modal.modal import HEARING, default_edge, solved_once
 from harness.sim.modal.modes import Modes, dampings
-from harness.sim.modal.stage_seconds import CPU, Begin, cpu, timed, wall
+from harness.sim.modal.solve import CPU, Begin, cpu, timed, wall
 from harness.sim.solid.surface_source import surface_of
 from harness.sim.solid.volume_mesh import read_volume
 

@@ -15,8 +15,7 @@ from harness.objectfile.touch.nodes import SurfaceNodes, signatures
 from harness.sim.gel.gel import GelSkirt, deform, over_range
 from harness.sim.gel.height_file import MOST_BEYOND
 from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
-from harness.sim.gel.press_pose import contact_place
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.press_pose import Presses, contact_place
 
 DEPTHS = (0.5e-3, 2e-3)
 """m that a press may be deep, as in ObjectFolder 2.0."""

@@ -17,7 +17,7 @@ from harness.objectfile.touch.touch import Maps
 from harness.objectfile.touch_entries import MAP_RANGE
 from harness.sim.gel.gel import GelSkirt
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.press_pose import Presses
 
 _OTHER_PLACES = 1_000_003
 """Added to a seed: places that are drawn with it are none of the nodes'."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
-from harness.basics.faces.ray_triangle import ON_EDGE, meeting, triangles_of
+from harness.basics.faces.ray_mesh import ON_EDGE, meeting, triangles_of
 
 _DIRECTIONS = 12
 _FACES_ASKED = 48

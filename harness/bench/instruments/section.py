@@ -67,7 +67,7 @@ KINDS: dict[str, InstrumentKind] = {
     "portaudio": InstrumentKind(
         section="harness.bench.instruments.sound:MicrophoneSection",
         driver="drivers.microphone.microphone:PortAudioMicrophone",
-        mock="mocks.sound_card.strike_on_card:start_microphone",
+        mock="mocks.sound_card.card:start_microphone",
         in_process="mocks.in_process.bench:build_microphone",
     ),
 }

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from harness.objectfile.file import ObjectFile
     from harness.objectfile.touch.touch import ObjectTouch, TouchLevel
     from harness.sim.gel.press_pose import ContactPlace
-    from harness.sim.optics.pressed_gel import Gel
+    from harness.sim.optics.known_gel import Gel
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ def _rendered(
     from harness.objectfile.file import ObjectFile
     from harness.objectfile.touch.level import require_gel
     from harness.objectfile.touch.touch import ReferenceMaps, open_touch
-    from harness.sim.gel.presses import Presses
+    from harness.sim.gel.press_pose import Presses
 
     begun = time.perf_counter()
     of = ObjectFile.open(folder)
@@ -178,7 +178,7 @@ def _pressed(of: "ObjectFile", touch: "ObjectTouch", place: "ContactPlace", by: 
     from harness.basics.toml_file import validate
     from harness.bench.scene import SceneFile
     from harness.effects.touch_press import press_heights
-    from harness.sim.gel.presses import Presses
+    from harness.sim.gel.press_pose import Presses
 
     surface = touch.at(Presses.one(place.point, place.normal, *by.pose))[0]
     what = {"mesh": str(of.folder / of.description.mesh.file), "material": "steel"}

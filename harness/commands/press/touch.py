@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from harness.bench.scene import SceneFile
     from harness.effects.quantities import Quantities
     from harness.sim.gel.height_file import Heights
-    from harness.sim.optics.pressed_gel import Gel
+    from harness.sim.optics.known_gel import Gel
 
 
 def touch(
@@ -264,7 +264,7 @@ def _described_gel(
 
     from harness.basics.quantities import LENGTH
     from harness.picture.image_file import read_image
-    from harness.sim.gel.marker_file import read_markers
+    from harness.sim.gel.markers import read_markers
     from harness.sim.optics.known_gel import known_gel
 
     gel = known_gel(
@@ -331,8 +331,7 @@ def _press_mesh(
     from harness.basics.quantities import ANGLE, LENGTH
     from harness.effects.scene_object import known_object
     from harness.effects.touch_press import press_gel
-    from harness.sim.gel.press_pose import gel_from_object
-    from harness.sim.gel.presses import Presses
+    from harness.sim.gel.press_pose import Presses, gel_from_object
 
     depth = options.quantity("--depth", pose[0] or "1mm", LENGTH)
     tilt, azimuth, yaw = (

@@ -41,8 +41,7 @@ from harness.objectfile.touch.touch import open_touch
 from harness.objectfile.vision.render import open_vision
 from harness.picture.image_file import write_png
 from harness.picture.pinhole import DirectionalLight, Pinhole
-from harness.sim.gel.press_pose import contact_place
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.press_pose import Presses, contact_place
 from harness.sim.optics.known_gel import known_gel
 from harness.sim.optics.optics import Optics
 from harness.sim.sound.modal_sound import check_rate

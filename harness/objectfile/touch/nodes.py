@@ -9,7 +9,7 @@ from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.errors import DataRefused, OutOfDomain
 from harness.basics.geometry import inverse
 from harness.objectfile.npy_file import npy_array, npy_bytes
-from harness.sim.gel.presses import Presses, frames_facing
+from harness.sim.gel.press_pose import Presses, frames_facing
 
 BEND = 20e-3
 """m: the distance that counts as much as a turn of the normal by one radian."""

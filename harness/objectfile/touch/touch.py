@@ -19,7 +19,7 @@ from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes, nodes_from
 from harness.objectfile.touch_entries import CodesEntry, GelEntry, TouchEntry
 from harness.sim.gel.gel import deform, over_range, require_within_gel
 from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.press_pose import Presses
 
 if TYPE_CHECKING:
     from harness.objectfile.runtime import Network

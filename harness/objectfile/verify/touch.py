@@ -8,7 +8,7 @@ from harness.objectfile.file import ObjectFile
 from harness.objectfile.touch.nodes import nodes_from
 from harness.objectfile.touch.touch import open_touch
 from harness.objectfile.touch_entries import CodesEntry
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.press_pose import Presses
 
 _PRESSES = 16
 

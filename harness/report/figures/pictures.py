@@ -9,8 +9,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply, rotation_about, transform, translation
-from harness.basics.mesh import Mesh
-from harness.basics.mesh_hull import closed_hull
+from harness.basics.mesh import Mesh, closed_hull
 from harness.bench.kinematics import link_frames
 from harness.bench.sensor import TactileSensor
 from harness.bench.ur_tables import arm_table

@@ -12,18 +12,92 @@ at or below it. Of all pressures of zero and more that is the one with the least
 (Kalker; Johnson, Contact Mechanics, 1985, section 5.9), found by conjugate gradients on the squares that
 press (Polonsky and Keer, A numerical method for solving rough contact problems, Wear 231, 1999), with the
 layer's influence summed by transforms on a grid of twice the size: no load meets a copy of itself.
+
+An arm presses an object of one kind, reads its force sensor, and writes how deep it was, or how much
+volume it took of the gel. A table by depth holds for that very object; one by volume is nearly the
+same for objects of like breadth.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field, model_validator
 from scipy.fft import irfft2, next_fast_len, rfft2
+from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import find_objects, label
 
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
 from harness.basics.errors import OutOfDomain
+from harness.basics.files.json_file import read_model
+from harness.basics.toml_file import StrictModel
 from harness.sim.gel.elastic import GelElastic, disc_stiffness, influence
+
+Above = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Said = Annotated[str, Field(min_length=1)]
+
+_UNITS = {"depth_m": (1e3, "mm deep"), "volume_m3": (1e9, "mm^3 of the gel taken")}
+
+
+class ForceRow(StrictModel):
+    """What was measured at one depth."""
+
+    at: Above  #: metres, or cubic metres, by the table's ``of``.
+    force_n: Above  #: N, mean of the readings.
+    sigma_n: Above
+    """N, one standard deviation of a press from that mean: the scatter of repeated presses, with the force
+    sensor's own uncertainty."""
+
+
+class ForceTable(StrictModel):
+    """Forces of one gel and one kind of object, least first."""
+
+    schema_number: Literal[1] = Field(alias="schema")  #: of the file.
+    sensor: Said  #: make.
+    serial: str  #: of the very gel.
+    indenter: Said  #: what was pressed, in words.
+    made_from: Said  #: the readings.
+    of: Literal["depth_m", "volume_m3"]
+    """what ``at`` is: the deepest pixel, or the volume between the object and the untouched gel."""
+    rows: Annotated[list[ForceRow], Field(min_length=3)]  #: both ``at`` and ``force_n`` rise.
+
+    @model_validator(mode="after")
+    def _rises(self) -> "ForceTable":
+        for k, (one, other) in enumerate(pairwise(self.rows)):
+            if other.at <= one.at or other.force_n <= one.force_n:
+                raise ValueError(
+                    f"row {k + 2} ({other.at:g}, {other.force_n:g} N) does not lie above row {k + 1} "
+                    f"({one.at:g}, {one.force_n:g} N): a deeper press takes more force; sort the rows, and "
+                    "press again what does not rise"
+                )
+        return self
+
+    def at(self, measure: float) -> tuple[float, float]:
+        """N and its standard deviation; nothing pressed is no force, and known.
+
+        Args:
+            measure: metres or cubic metres, by ``of``.
+
+        Raises:
+            OutOfDomain: more than the last row.
+        """
+        rows = [(0.0, 0.0, 0.0), *((row.at, row.force_n, row.sigma_n) for row in self.rows)]
+        at, force, sigma = np.array(rows).T
+        if not 0.0 <= measure <= at[-1]:
+            scale, words = _UNITS[self.of]
+            raise OutOfDomain(
+                f"the press is {measure * scale:.4g} {words} and the table of forces ends at "
+                f"{at[-1] * scale:.4g}; nothing is read beyond it: press less, or measure deeper presses"
+            )
+        # Cubics that pass every row and rise wherever the rows do (Fritsch and Butland, 1984).
+        return float(PchipInterpolator(at, force)(measure)), float(np.interp(measure, at, sigma))
+
+    def measure(self, depth: FloatArray, pitch: float) -> float:
+        """What the table goes by, of one press ``(rows, columns)`` metres."""
+        return float(depth.max() if self.of == "depth_m" else depth.sum() * pitch**2)
+
 
 ForceLevel = Literal["winkler", "layer"]
 
@@ -328,3 +402,8 @@ def contact_pressure(depth: FloatArray, pitch: float, thickness: float, gel: Gel
     found = _Search(depth[rows, columns], pitch, thickness, gel).run()
     pascals[rows, columns] = found.pascals
     return Pressure(read_only(pascals), found.left, found.turns)
+
+
+def read_force_table(path: Path) -> ForceTable:
+    """A table of forces, ``docs/explanation/touch_force.md``; raises as ``read_model``."""
+    return read_model(path, ForceTable, "table of forces", "docs/explanation/touch_force.md shows one")

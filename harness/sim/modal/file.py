@@ -18,8 +18,15 @@ from harness.objects.builtin import BUILTIN
 from harness.sim.modal.element_edge import finely_filled
 from harness.sim.modal.modal import HEARING, curved
 from harness.sim.modal.modes import dampings
-from harness.sim.modal.solve import Elasticity, Solution, check_elasticity, check_limit, solve_mesh
-from harness.sim.modal.stage_seconds import Begin, ignore_stage
+from harness.sim.modal.solve import (
+    Begin,
+    Elasticity,
+    Solution,
+    check_elasticity,
+    check_limit,
+    ignore_stage,
+    solve_mesh,
+)
 from harness.sim.solid.filled import filled
 from harness.sim.solid.modal_mesh import QuadraticMesh
 from harness.sim.solid.surface_source import surface_of

@@ -18,8 +18,7 @@ from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
 from harness.basics.store import Store, digest
 from harness.sim.modal.modes import Modes
-from harness.sim.modal.solve import Elasticity, check_limit, solve_mesh
-from harness.sim.modal.stage_seconds import CPU, Begin, ignore_stage, timed
+from harness.sim.modal.solve import CPU, Begin, Elasticity, check_limit, ignore_stage, solve_mesh, timed
 from harness.sim.solid.filled import FillingSeconds, filled
 from harness.sim.solid.modal_kernels import MASS_POINTS, MASS_WEIGHTS, determinants, shape_slopes
 from harness.sim.solid.modal_mesh import QuadraticMesh, least_determinant, middles_of, quadratic_mesh

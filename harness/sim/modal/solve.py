@@ -1,20 +1,240 @@
-"""From ten-node tetrahedra to modes: free, or held at some of their nodes."""
+"""From ten-node tetrahedra to modes: free, or held at some of their nodes.
 
-from collections.abc import Mapping
+Grimes, Lewis and Simon, A Shifted Block Lanczos Algorithm for Solving Sparse Symmetric
+Generalized Eigenproblems, SIAM J. Matrix Analysis 15(1), 1994, with one shift below the
+spectrum, every block held orthogonal to all earlier ones and to the rigid motions, and the
+number of modes checked against the inertia of ``K - w^2 M`` at the limit.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import eigh, solve_triangular
 from threadpoolctl import threadpool_limits
 
 from harness.basics.arrays import BoolArray, FloatArray
-from harness.basics.errors import WrongUse
+from harness.basics.errors import MeshRefused, WrongUse
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
-from harness.sim.modal.lanczos import DENSE, EigenPairs, modes_below
+from harness.sim.factor.factorisation import Factor, factorised, inertia
 from harness.sim.modal.modes import Modes
-from harness.sim.modal.stage_seconds import Begin, ignore_stage, timed
 from harness.sim.modal.system import MassRule, ModalSystem, modal_system
 from harness.sim.solid.modal_mesh import QuadraticMesh
+
+_BLOCK = 8
+_PER_MODE = 6
+"""Vectors of the basis for each mode wanted: mostly four are enough."""
+
+_TOLERANCE = 1e-9
+"""Of a Ritz pair's residual against its own value."""
+
+_BEYOND = 1e-2
+"""The same for the first mode beyond the limit, which only has to be known to be beyond."""
+
+_GROWTH = 1e6
+"""Of the pivots' size, up to which their signs are taken for those of the eigenvalues: the matrix
+that they belong to is then within about 1e-10 of the one asked about."""
+
+DENSE = 600
+"""Unknowns up to which every mode of the system is computed at once."""
+
+_SAME = 1e-4
+"""Relative distance of squared frequencies below which two modes are taken as a pair."""
+
+
+@dataclass(frozen=True, eq=False)
+class EigenPairs:
+    """The modes of a system."""
+
+    values: FloatArray  #: ``(m,)`` (rad/s)^2, ascending.
+    vectors: FloatArray  #: ``(u, m)`` 1/sqrt(kg), mass-orthonormal, of the system's unknowns.
+    residual: float  #: the worst ``|K x - w^2 M x| / (w^2 |M x|)``.
+    certified: bool  #: whether an inertia count confirmed that none is missing.
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Mass-orthonormal columns."""
+
+    unit: FloatArray  #: ``(u, b)``.
+    weighted: FloatArray  #: the mass matrix times them.
+    combination: FloatArray  #: ``(b, b)``, by which they give the block that they were made of.
+
+
+class _Lanczos:
+    """One run from one random block."""
+
+    def __init__(self, system: ModalSystem, factor: Factor, seed: int, block: int = _BLOCK) -> None:
+        self.system = system
+        self.factor = factor
+        size = system.rigid.shape[0]
+        self.block = min(block, size - system.rigid.shape[1])
+        self.most = size - system.rigid.shape[1]
+        self.basis = np.empty((size, 0), order="F")
+        self.used = 0
+        self.projected = np.zeros((0, 0))
+        self.random = np.random.default_rng(seed)
+
+    def run(self, ceiling: float, most: int | None) -> tuple[FloatArray, FloatArray, float]:
+        """Values and vectors of every mode up to ``ceiling`` (rad/s)^2, or the lowest ``most``.
+
+        Also returns the ceiling below which these are all.
+        """
+        self._reserve(24 * self.block if most is None else _PER_MODE * most)
+        start = self._cleared(self.random.standard_normal((self.basis.shape[0], self.block)))
+        current = self._orthonormal(start, self.system.weighted(start))
+        check_at = 6 * self.block
+        while True:
+            self._append(current.unit)
+            last = self.used + self.block > self.most
+            step, coupling = self._step(current)
+            if self.used >= check_at or last:
+                found = self._converged(coupling, ceiling, most, last)
+                if found is not None:
+                    return found
+                check_at = int(1.05 * self.used) + 1
+            current = step
+
+    def _append(self, current: FloatArray) -> None:
+        """Take a block into the basis, which doubles when it is full."""
+        end = self.used + current.shape[1]
+        if end > self.basis.shape[1]:
+            self._reserve(2 * self.basis.shape[1])
+        self.basis[:, self.used : end] = current
+        self.used = end
+
+    def _reserve(self, room: int) -> None:
+        """Room for so many vectors; memory is taken only as it is written to."""
+        room = min(max(room, 2 * self.block), self.most + self.block)
+        basis, projected = np.empty((self.basis.shape[0], room), order="F"), np.zeros((room, room))
+        basis[:, : self.used] = self.basis[:, : self.used]
+        projected[: self.used, : self.used] = self.projected[: self.used, : self.used]
+        self.basis, self.projected = basis, projected
+
+    def _step(self, current: "_Block") -> tuple["_Block", FloatArray]:
+        """The next block, and ``(b, b)`` what couples it to this one.
+
+        But for rounding an image holds of the basis only the last two blocks; these are taken out
+        first, and what rounding left of all of them once its size is known.
+        """
+        image = self.factor.solve(current.weighted)
+        wide = image.shape[1]
+        recent = max(0, self.used - wide - self.block)
+        image, known = self._without(image, self.system.weighted(image), recent)
+        unit = self._orthonormal(image, self.system.weighted(image))
+        image, missed = self._without(unit.unit, unit.weighted)
+        again = self._orthonormal(image, self.system.weighted(image))
+        coupled = missed @ unit.combination
+        coupled[recent:] += known
+        span = slice(self.used - wide, self.used)
+        self.projected[: self.used, span] = coupled
+        self.projected[span, : self.used] = self.projected[: self.used, span].T
+        return again, again.combination @ unit.combination
+
+    def _without(
+        self, block: FloatArray, weighted: FloatArray, first: int = 0
+    ) -> tuple[FloatArray, FloatArray]:
+        """What of a block is neither rigid motion nor in the basis from ``first`` on.
+
+        Returns:
+            That, and ``(used - first, b)`` what was of the basis.
+        """
+        known = self.basis[:, first : self.used]
+        rigid = self.system.rigid.T @ weighted
+        share = known.T @ weighted
+        return block - known @ share - self.system.rigid @ rigid, share
+
+    def _cleared(self, block: FloatArray) -> FloatArray:
+        """Without rigid motion and without what the basis already holds."""
+        for _ in range(2):
+            block, _ = self._without(block, self.system.weighted(block))
+        return block
+
+    def _orthonormal(self, block: FloatArray, weighted: FloatArray) -> "_Block":
+        """Mass-orthonormal columns that span a block.
+
+        Columns that the others already span are replaced by random ones.
+        """
+        gram = block.T @ weighted
+        scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
+        safe = np.where(scale > 0.0, scale, 1.0)
+        values, turned = np.linalg.eigh(gram / np.outer(safe, safe))
+        if values[0] > 1e-12:
+            upper = np.linalg.cholesky(gram / np.outer(safe, safe)).T * safe
+            unit, heavy = (solve_triangular(upper, part.T, trans="T").T for part in (block, weighted))
+            return _Block(unit, heavy, upper)
+        return self._refilled(block / safe, values, turned, safe)
+
+    def _refilled(
+        self, block: FloatArray, values: FloatArray, turned: FloatArray, scale: FloatArray
+    ) -> "_Block":
+        """As ``_orthonormal`` where the columns depend on each other."""
+        kept = values > 1e-12
+        roots = np.sqrt(np.where(kept, values, 1.0))
+        unit = block @ turned / roots
+        unit[:, ~kept] = self._cleared(self.random.standard_normal((len(block), int((~kept).sum()))))
+        for _ in range(2):
+            fresh, old = unit[:, ~kept], unit[:, kept]
+            fresh = fresh - old @ (old.T @ self.system.weighted(fresh))
+            upper = np.linalg.cholesky(fresh.T @ self.system.weighted(fresh)).T
+            unit[:, ~kept] = solve_triangular(upper, fresh.T, trans="T").T
+        combination = np.where(kept, roots, 0.0)[:, None] * turned.T * scale
+        return _Block(unit, self.system.weighted(unit), combination)
+
+    def _converged(
+        self, coupling: FloatArray, ceiling: float, most: int | None, last: bool
+    ) -> tuple[FloatArray, FloatArray, float] | None:
+        """The wanted modes if all are known, and the first beyond them well enough."""
+        inverse, ritz = eigh(self.projected[: self.used, : self.used])
+        inverse, ritz = inverse[::-1], ritz[:, ::-1]
+        error = np.linalg.norm(coupling @ ritz[-self.block :], axis=0)
+        number = int((inverse >= 1.0 / (ceiling + self.system.shift)).sum())
+        if most is not None and number > most:
+            number = _whole_group(inverse, most)
+            between = 0.5 * (inverse[number - 1] + inverse[number])
+            ceiling = 1.0 / between - self.system.shift
+        if not last:
+            if number == self.used or (error[:number] > _TOLERANCE * inverse[:number]).any():
+                return None
+            beyond = inverse[number] + error[number] >= 1.0 / (ceiling + self.system.shift)
+            if beyond or error[number] > _BEYOND * inverse[number]:
+                return None
+        vectors = self.basis[:, : self.used] @ ritz[:, :number]
+        return 1.0 / inverse[:number] - self.system.shift, vectors, ceiling
+
+
+CPU = "cpu."
+"""Before a stage's name where its seconds are those of the processor, all threads together."""
+
+Begin = Callable[[str], None]
+"""Called with the name of a stage, in words, as it begins."""
+
+
+def ignore_stage(_stage: str) -> None:
+    """Report no stage."""
+
+
+@contextmanager
+def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Add what happens meanwhile to the seconds of a stage, under its name and under ``CPU`` and its name."""
+    begun, worked = time.perf_counter(), time.process_time()
+    yield
+    seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - begun
+    seconds[CPU + stage] = seconds.get(CPU + stage, 0.0) + time.process_time() - worked
+
+
+def wall(seconds: Mapping[str, float]) -> dict[str, float]:
+    """On the clock, by stage."""
+    return {stage: took for stage, took in seconds.items() if not stage.startswith(CPU)}
+
+
+def cpu(seconds: Mapping[str, float]) -> dict[str, float]:
+    """Of the processor, by stage."""
+    return {stage.removeprefix(CPU): took for stage, took in seconds.items() if stage.startswith(CPU)}
+
 
 _SHARE_OF_UNKNOWNS = 0.1
 """Above it, the modes of a mesh are those of its elements and not of the object."""
@@ -183,3 +403,72 @@ def check_elasticity(elasticity: Elasticity, cells: int) -> None:
         raise WrongUse(
             f"a Poisson's ratio of {worst:g} is outside -1 to 0.5; an incompressible solid is 0.49"
         )
+
+
+def modes_below(system: ModalSystem, limit: float, most: int | None = None) -> tuple[EigenPairs, float]:
+    """Every elastic mode up to ``limit`` Hz, or the lowest ``most`` of them.
+
+    Args:
+        system: free or held.
+        limit: Hz; infinite for as many as ``most`` says.
+        most: modes at most; fewer where that would part modes of one frequency.
+
+    Returns:
+        The modes, and up to which frequency in Hz they are all; infinite where the system has no more.
+
+    Raises:
+        MeshRefused: the stiffness cannot be factorised, or modes were missed twice.
+    """
+    if system.rigid.shape[0] <= DENSE:
+        return _dense(system, (2 * np.pi * limit) ** 2, most)
+    factor = factorised(system.shifted(system.shift), system.plan)
+    lowest = float(factor.pivots.values.min())
+    if lowest <= 0.0:
+        raise MeshRefused(
+            f"the stiffness of the object has a pivot of {lowest:.2g}, which must be above 0; its "
+            "volume mesh has an inverted element: mesh the object again"
+        )
+    for seed, block in ((1, _BLOCK), (2, 2 * _BLOCK)):
+        values, vectors, ceiling = _Lanczos(system, factor, seed, block).run((2 * np.pi * limit) ** 2, most)
+        pivots = inertia(system.shifted(-ceiling), system.plan)
+        expected = None
+        if pivots is not None and pivots.growth <= _GROWTH:
+            expected = pivots.negative - int(system.rigid.shape[1])
+        if expected is None or len(values) >= expected:
+            pairs = EigenPairs(values, vectors, _residual(system, values, vectors), len(values) == expected)
+            return pairs, float(np.sqrt(ceiling) / (2.0 * np.pi))
+    raise MeshRefused(
+        f"{len(values)} modes were found below {limit:g} Hz where the inertia of the system says "
+        f"{expected}; the volume mesh is too poor to be trusted: mesh it with another element size"
+    )
+
+
+def _dense(system: ModalSystem, ceiling: float, most: int | None) -> tuple[EigenPairs, float]:
+    """As ``modes_below`` for a small system."""
+    values, vectors = eigh(system.stiffness.toarray(), system.inertia().toarray())
+    rigid = system.rigid.shape[1]
+    values, vectors = values[rigid:], vectors[:, rigid:]
+    number = int(np.count_nonzero(values <= ceiling))
+    if most is not None and number > most:
+        number = _whole_group(1.0 / values, most)
+        ceiling = 0.5 * float(values[number - 1] + values[number])
+    kept, shapes = values[:number], vectors[:, :number]
+    return EigenPairs(kept, shapes, _residual(system, kept, shapes), True), float(
+        np.sqrt(ceiling) / (2 * np.pi)
+    )
+
+
+def _residual(system: ModalSystem, values: FloatArray, vectors: FloatArray) -> float:
+    if len(values) == 0:
+        return 0.0
+    inertia = system.weighted(vectors) * values
+    gap = np.linalg.norm(system.stiffness @ vectors - inertia, axis=0)
+    return float((gap / np.linalg.norm(inertia, axis=0)).max())
+
+
+def _whole_group(descending: FloatArray, most: int) -> int:
+    """At most ``most``, and fewer where that would part modes of one frequency."""
+    for number in range(most, 0, -1):
+        if descending[number] < (1.0 - _SAME) * descending[number - 1]:
+            return number
+    return most

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
-from harness.basics.faces.face_grid import FaceGrid, build_face_grid
+from harness.basics.faces.face_clusters import FaceGrid, build_face_grid
 from harness.basics.faces.mesh_rays import column_crossings, first_distances
 from harness.basics.faces.nearest_kernels import nearest_places
 from harness.basics.mesh import Mesh

@@ -5,8 +5,7 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 from harness.basics.errors import WrongUse
-from harness.bench.device import CAMERA
-from harness.bench.reading import Reading
+from harness.bench.device import CAMERA, Reading
 from harness.bench.station import BARE, LOOK, Bench
 from harness.bench.travel import Trajectory
 from harness.recording.observation import BARE_IMAGE, IMAGE

@@ -13,10 +13,26 @@ import numpy as np
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.basics.errors import MotionRefused, WrongUse
 from harness.basics.geometry import frame_facing, transform
-from harness.skills.exploring.surroundings import Surroundings
+from harness.basics.mesh import Mesh, closed_hull
+from harness.bench.scene import SceneFile
+from harness.bench.station_file import Station
 from harness.skills.press import ContactMotion
-from harness.twin.motion import PlannedContact, plan_contact
+from harness.skills.strike import StrikeMotion
+from harness.twin.bench import TwinBench
+from harness.twin.motion import PlannedContact, PlannedStrike, plan_contact
 from harness.twin.rehearsal import rehearse
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """The bench around an object of which too little is known."""
+
+    scene: SceneFile  #: of the run.
+    station: Station  #: whose arm it is.
+    travels: TwinBench  #: the bench with all the space that the object may take in its place.
+    nothing: TwinBench  #: the bench without an object.
+    joints: FloatArray  #: ``(6,)`` rad, where the arm is.
+
 
 LINES = 40
 """Lines that are tried, for a way that suggests itself first and then once more for one that is searched."""
@@ -172,3 +188,32 @@ def gel_first(along: FloatArray) -> tuple[BoolArray, IntArray]:
     first = gel.argmin(axis=1)
     at = gel[np.arange(len(gel)), first]
     return np.isfinite(at) & (housing.min(axis=1) > at + PRESSED), first
+
+
+def nowhere(place: FloatArray) -> Mesh:
+    """A mark of 2 mm on the support, in base: stands for an object of which nothing is known.
+
+    Args:
+        place: ``(3,)`` m in base: where the object nominally stands.
+    """
+    low = np.array([-1.0e-3, -1.0e-3, 0.0])
+    ends = np.array([low, low + 2.0e-3]) + place
+    corners = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    return closed_hull(corners)
+
+
+def rehearsed_strike(strike: PlannedStrike, travels: TwinBench, lines: TwinBench) -> StrikeMotion:
+    """A planned strike, gone through in the twin.
+
+    Raises:
+        MotionRefused: it must not be made.
+    """
+    rehearse(travels, strike.travels(0)).require()
+    rehearse(lines, strike.lines(0)).require()
+    return StrikeMotion.planned(strike)
+
+
+def end_of(parameters: Any) -> FloatArray:
+    """``(6,)`` rad: where a contact or a strike of these parameters leaves the arm."""
+    travel = np.asarray(parameters["travel_rad"], dtype=np.float64).reshape(-1, 6)
+    return travel[-1] if len(travel) else np.asarray(parameters["start_rad"], dtype=np.float64)

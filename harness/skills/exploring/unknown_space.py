@@ -14,8 +14,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from harness.basics.arrays import FloatArray, read_only
-from harness.basics.mesh import Mesh
-from harness.basics.mesh_hull import closed_hull, hull_of
+from harness.basics.mesh import Mesh, closed_hull, hull_of
 from harness.bench.instruments.cameras import CameraSection
 from harness.picture.camera_errors import CameraErrors
 from harness.picture.outline import SeenOutline, corners_of, directions

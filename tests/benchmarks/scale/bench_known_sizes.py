@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.scale_estimation.answer import ScaleAnswering
+from experiments.scale_estimation.answer import KNOBS, ScaleAnswering
 from experiments.scale_estimation.cells import ScaleCell, scene_of
-from experiments.scale_estimation.dials import KNOBS
 from experiments.scale_estimation.size import Belief
 from harness.basics.errors import FitRefused
 from harness.bench.scene import SceneFile, scene_from_json, scene_from_options

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from rich.console import Console
 
-from experiments.scale_estimation.answer import ScaleAnswering
+from experiments.scale_estimation.answer import KNOBS, ScaleAnswering
 from experiments.scale_estimation.cells import ScaleCell, scene_of
-from experiments.scale_estimation.dials import KNOBS
 from experiments.scale_estimation.size import Belief
 from harness.basics.errors import FitRefused
 from harness.bench.scene import SceneFile, scene_from_options

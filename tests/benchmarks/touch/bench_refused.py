@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, perform, scene_of
 from experiments.contact_localization.answer import Models, prepare, solve
 from experiments.contact_localization.build_model import model_of_scene
-from experiments.contact_localization.posterior.dials import (
+from experiments.contact_localization.posterior.estimate import (
     BLOCK,
     METHOD,
     ROUNDS,

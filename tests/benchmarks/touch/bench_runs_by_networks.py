@@ -19,7 +19,7 @@ from rich.console import Console
 
 from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, perform
 from experiments.contact_localization.answer import Models, prepare, solve
-from experiments.contact_localization.posterior.dials import SENSES, needs_images
+from experiments.contact_localization.posterior.estimate import SENSES, needs_images
 from harness.bench.scene import scene_from_options
 from harness.bench.station_file import load_station, station_path
 from harness.effects.accuracy import Level, Setting

@@ -42,7 +42,7 @@ from harness.objectfile.touch.touch import (
 from harness.objects.household import MATERIALS, build
 from harness.picture.image_metrics import mean_square, psnr, ssim
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.press_pose import Presses
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell

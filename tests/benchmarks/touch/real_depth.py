@@ -22,8 +22,8 @@ from calibration.taxim.pictures import Pictures, read_pictures
 from calibration.taxim.smooth_fit import changes
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.sim.optics.contact_depth import read_depth
+from harness.sim.optics.depth_reading import height_errors
 from harness.sim.optics.inverse import DRIFTING, invert
-from harness.sim.optics.inverse_error import height_errors
 from harness.sim.optics.poisson import free_heights
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell

@@ -21,7 +21,7 @@ from harness.bench.sensor import TactileSensor
 from harness.sim.gel.gel import R15_SKIRT, deform
 from harness.sim.optics.optics import Optics, OpticsLevel
 from harness.sim.optics.published_pack import PublishedPack, read_published
-from harness.sim.optics.shadow_image import darkening
+from harness.sim.optics.shadow import darkening
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell
 from tests.samples.real_press import (

@@ -23,8 +23,7 @@ from harness.bench.sensor import TactileSensor
 from harness.picture.image_metrics import psnr
 from harness.sim.optics.optics import Optics
 from harness.sim.optics.published_pack import read_published
-from harness.sim.optics.shadow import ShadowTable, cast_shadows
-from harness.sim.optics.shadow_image import darkened, darkening
+from harness.sim.optics.shadow import ShadowTable, cast_shadows, darkened, darkening
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.oracles.published_shadow import (
     OTHER,

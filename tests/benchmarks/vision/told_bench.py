@@ -20,7 +20,7 @@ from rich.table import Table
 from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, performed
 from experiments.contact_localization.answer import Models
 from experiments.contact_localization.posterior.baselines import without_images
-from experiments.contact_localization.posterior.dials import SPACING, Senses
+from experiments.contact_localization.posterior.estimate import SPACING, Senses
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_about
 from harness.basics.symmetry import find_symmetries

@@ -12,7 +12,7 @@ from calibration.markers.at_rest import lay_lattice
 from calibration.markers.dots import find_dots
 from harness.cli import invoke
 from harness.picture.image_file import read_image, write_png
-from harness.sim.gel.marker_file import read_markers
+from harness.sim.gel.markers import read_markers
 from tests.samples.drawn_dots import DrawnDots
 
 UNMARKED = (

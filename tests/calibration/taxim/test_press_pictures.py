@@ -11,7 +11,7 @@ from calibration.taxim.gates import Detector
 from calibration.taxim.held_out import score, teach
 from calibration.taxim.mark_free import _usable
 from calibration.taxim.pictures import Pictures, PressPack, read_pictures
-from calibration.taxim.polycalib import write_polycalib
+from calibration.taxim.result import write_polycalib
 from calibration.taxim.smooth_fit import changes
 from harness import cli
 from harness.basics.arrays import block_means

@@ -18,7 +18,7 @@ from drivers.camera.http_camera import HttpCamera, gelsight, scene_camera
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
-from harness.bench.reading import Channel
+from harness.bench.device import Channel
 from harness.bench.sensor import GELSIGHT_R15
 from harness.picture.image_file import decode_jpeg, read_image
 from mocks.camera.gelsight_stream import MjpegServer, encode

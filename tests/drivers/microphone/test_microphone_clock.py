@@ -7,8 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.microphone.blocks import Block, Blocks, Format
-from drivers.microphone.readings import fit_clock, overloaded, places_of_doubt, readings, steps, usual_rate
+from drivers.microphone.readings import (
+    Block,
+    Blocks,
+    Format,
+    fit_clock,
+    overloaded,
+    places_of_doubt,
+    readings,
+    steps,
+    usual_rate,
+)
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused
 from harness.bench.microphone_take import BAD, COUNT_BROKEN, flags_of, words

@@ -3,7 +3,7 @@
 import pytest
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.likelihood import Noise
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.touch.touch import Contact
 from harness.bench.sensor import GELSIGHT_R15

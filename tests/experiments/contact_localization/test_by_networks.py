@@ -22,7 +22,7 @@ from harness.experiment.in_process import performed
 from harness.experiment.levels import chosen_levels
 from harness.objectfile.file import ObjectFile
 from harness.recording.run_folder import RunFiles
-from harness.sim.gel import height_map, raster_kernels
+from harness.sim.gel import height_map
 from tests.samples import touch_bench as tb
 
 STATION = load_station(station_path("mock"))
@@ -47,7 +47,7 @@ def run(of: ObjectFile, tmp_path_factory: pytest.TempPathFactory) -> RunFiles:
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What was rasterised and solved, call by call."""
     calls: list[str] = []
-    rasterise = raster_kernels.rasterise
+    rasterise = height_map.rasterise
 
     def counted(*given: Any) -> Any:
         calls.append("rasterised")

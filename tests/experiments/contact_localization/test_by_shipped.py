@@ -22,7 +22,7 @@ from harness.experiment.levels import chosen_levels
 from harness.experiment.object_modes import object_modes
 from harness.recording.run_folder import RunFiles
 from harness.report.run_page import network_rows
-from harness.sim.gel import height_map, raster_kernels
+from harness.sim.gel import height_map
 
 STATION = load_station(station_path("mock"))
 CALLS = ("touch.image", "camera.image")
@@ -48,7 +48,7 @@ def simulated(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What was rasterised, followed by rays on the mesh and solved, call by call."""
     calls: list[str] = []
 
-    rasterise = raster_kernels.rasterise
+    rasterise = height_map.rasterise
 
     def counted(*given: Any) -> Any:
         calls.append("rasterised")

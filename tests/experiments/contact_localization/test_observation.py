@@ -10,7 +10,7 @@ from experiments.contact_localization.touch.touch import Contact, TouchNoise, co
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import DataRefused, RecordingDamaged, WrongUse
 from harness.basics.geometry import quaternion_from_rotation, rotation_about, rotation_from_vector, transform
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Reading
 from harness.bench.sensor import GELSIGHT_R15
 from harness.picture.square_pixels import made_square
 from harness.recording.observation import AROUND_IMAGES, Observation, observe_step

@@ -23,7 +23,7 @@ from experiments.paper.scale_samples import PAPER_MAKERS, crop_camera
 from experiments.paper.scale_table import PAPER_ROWS, PaperReadings, paper_sizes
 from experiments.paper.train import main
 from experiments.scale_estimation.explorer import plan
-from experiments.scale_estimation.touch.patch import Patch
+from experiments.scale_estimation.touch.fit import Patch
 from experiments.scale_estimation.unseen import train as own
 from experiments.scale_estimation.unseen.training.outlines import PLACE, drawn_camera
 from experiments.scale_estimation.unseen.training.samples import shape_of
@@ -38,7 +38,7 @@ from harness.objects.household import build
 from harness.sim.light.appearance import Appearance, smooth_normals
 from harness.sim.light.direct_image import LitObject
 from harness.sim.sound.synthesis import synthesize
-from mocks.camera.scene_view import Body, SceneView
+from mocks.world.world import Body, SceneView
 
 FOCAL = 600.0
 RATE = 32e3

@@ -17,8 +17,8 @@ from experiments.paper.scale_table import (
     random_error,
     run_cell,
 )
+from experiments.scale_estimation.answer import STARTS
 from experiments.scale_estimation.cells import ScaleCell, scene_of
-from experiments.scale_estimation.dials import STARTS
 from experiments.scale_estimation.experiment import MEASUREMENT
 from experiments.scale_estimation.size import SizeRange
 from harness.bench.scene import scene_from_json

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from experiments.scale_estimation.answer import ScaleAnswering
-from experiments.scale_estimation.dials import KNOBS
+from experiments.scale_estimation.answer import KNOBS, ScaleAnswering
 from experiments.scale_estimation.experiment import EXPERIMENT
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.scale_estimation.contact_planning import FLATTEST, aims_unmet, lowest_end, placed
 from experiments.scale_estimation.model import ObjectModel
-from experiments.scale_estimation.touch.patch import POINTS, Patch, free_line
+from experiments.scale_estimation.touch.fit import POINTS, Patch, free_line
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import transform
 from harness.bench.station_file import Station

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.unseen.answer import shape_sigma
-from experiments.scale_estimation.unseen.training.real_shapes import (
+from experiments.scale_estimation.unseen.train import (
     SIGMAS,
     likeliest_sigma,
     log_densities,

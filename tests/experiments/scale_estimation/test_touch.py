@@ -9,19 +9,21 @@ import pytest
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.size import STEP, Belief, SizeRange
 from experiments.scale_estimation.touch.fit import (
+    POINTS,
     THROUGH,
     UNKNOWNS,
     FreeSpace,
+    Patch,
     Stand,
     StandErrors,
     distinct_paths,
+    patch_of,
 )
-from experiments.scale_estimation.touch.patch import POINTS, Patch, patch_of
 from experiments.scale_estimation.touch.touch import Touch, by_touch, doubted_cost
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import rotation_about, transform
-from harness.bench.bench_errors import USUAL
+from harness.bench.gap import USUAL
 from harness.bench.station_file import Station
 from harness.objects.household import build
 from harness.sim.solid.surface_samples import sample_surface

@@ -9,9 +9,15 @@ import pytest
 
 from experiments.scale_estimation.size import SizeRange
 from experiments.scale_estimation.unseen.network import opened
-from experiments.scale_estimation.unseen.ringing_shape import SOLVED_AT, SOLVED_OF, RingingShape
 from experiments.scale_estimation.unseen.train import main
-from experiments.scale_estimation.unseen.training.samples import MAKERS, ringing_of, samples_of
+from experiments.scale_estimation.unseen.training.samples import (
+    MAKERS,
+    SOLVED_AT,
+    SOLVED_OF,
+    RingingShape,
+    ringing_of,
+    samples_of,
+)
 from harness.basics.materials import MATERIALS
 
 

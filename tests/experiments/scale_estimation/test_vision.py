@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.scale_estimation.size import SizeRange
-from experiments.scale_estimation.vision.fit import View
-from experiments.scale_estimation.vision.vision import NO_SIZE, by_sight
+from experiments.scale_estimation.vision.vision import NO_SIZE, View, by_sight
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import DataRefused, FitRefused
 from harness.basics.geometry import transform
@@ -15,7 +14,7 @@ from harness.objects.household import build
 from harness.picture.camera_errors import CameraErrors
 from harness.picture.object_mask import mask_by_background
 from harness.picture.outline import SeenOutline, directions, read_outline
-from mocks.camera.scene_view import Body, SceneView
+from mocks.world.world import Body, SceneView
 
 RANGE = SizeRange(0.05, 0.45)
 ROWS, COLUMNS, FOCAL = 480, 640, 600.0

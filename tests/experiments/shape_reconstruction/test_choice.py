@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.shape_reconstruction.choice import choose
 from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.kinds import draw_shape
 from experiments.shape_reconstruction.fits import FOLDS, FamilyFit, SmoothSurface, folds_of
+from experiments.shape_reconstruction.reconstruct import choose
 from experiments.shape_reconstruction.thresholds import (
     ASSUMED_DEVIATION,
     MAX_BEYOND_CONTACTS,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from experiments.shape_reconstruction.fits import ShapeEstimate
 from experiments.shape_reconstruction.result import PALE_AT, colours_of, write_estimate
-from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import DataRefused
 from harness.objects.builtin import build
 

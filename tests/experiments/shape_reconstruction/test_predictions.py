@@ -7,12 +7,12 @@ import pytest
 import trimesh
 
 from experiments.shape_reconstruction.family.estimate import fit_family
-from experiments.shape_reconstruction.family.settings import LEVELS
+from experiments.shape_reconstruction.family.search import LEVELS
+from experiments.shape_reconstruction.fits import TOUCHED
 from experiments.shape_reconstruction.prior.surface import predict_surface
 from experiments.shape_reconstruction.reconstruct import outline_error, predict_left_out
 from experiments.shape_reconstruction.smooth.bent_prior import bend_prior
 from experiments.shape_reconstruction.smooth.free_space import CLEARANCE, sensor_depth
-from experiments.shape_reconstruction.surface import TOUCHED
 from harness.basics.errors import FitRefused
 from harness.basics.faces.nearest_surface import NearestSurface
 from harness.basics.mesh import Mesh

@@ -10,13 +10,11 @@ from experiments.shape_reconstruction import reconstruct as reconstruction
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.kinds import draw_shape
-from experiments.shape_reconstruction.family.search import Hypothesis
-from experiments.shape_reconstruction.family.settings import CONTINUED, FamilySettings
-from experiments.shape_reconstruction.fits import FamilyFit, SmoothSurface
+from experiments.shape_reconstruction.family.search import CONTINUED, FamilySettings, Hypothesis
+from experiments.shape_reconstruction.fits import FamilyFit, ShapeEstimate, SmoothSurface
 from experiments.shape_reconstruction.prior.network import shipped, with_prior_points
 from experiments.shape_reconstruction.reconstruct import reconstruct, reconstruct_with_prior
 from experiments.shape_reconstruction.smooth.hermite import fit_rbf
-from experiments.shape_reconstruction.surface import ShapeEstimate
 from experiments.shape_reconstruction.thresholds import (
     MAX_NUISANCE_COST,
     MAX_NUISANCE_OF_FEW,

@@ -9,12 +9,12 @@ import pytest
 from experiments.paper.shape_baselines import by_hull
 from experiments.paper.shape_retrieval import by_retrieval, household_library
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
+from experiments.shape_reconstruction.fits import TOUCHED
 from experiments.shape_reconstruction.methods import Method, estimated
 from experiments.shape_reconstruction.smooth.hermite import fit_rbf
-from experiments.shape_reconstruction.surface import TOUCHED
 from experiments.shape_reconstruction.thresholds import ASSUMED_DEVIATION
 from harness.basics.geometry import rotation_about, transform, translation
-from harness.bench.bench_errors import USUAL
+from harness.bench.gap import USUAL
 from harness.objects.builtin import build
 from tests.support.shape_readings import look_at, shape_readings, touches_on
 

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.shape_reconstruction.answer import evidence_of
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.experiment import EXPERIMENT
-from experiments.shape_reconstruction.explore.explorer import ShapeExplorer
-from experiments.shape_reconstruction.explore.running import RunningShape
+from experiments.shape_reconstruction.explore.explorer import RunningShape, ShapeExplorer
 from experiments.shape_reconstruction.methods import METHOD, METHODS, QUICK, REMOVED, estimated
-from experiments.shape_reconstruction.readings import evidence_of
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.basics.errors import FitRefused, WrongUse
 from harness.basics.geometry import apply

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from experiments.shape_reconstruction.fits import UNOBSERVED, ShapeEstimate
 from experiments.shape_reconstruction.metric import BAND90, BandHeld, band_held, surfaces_apart
-from experiments.shape_reconstruction.surface import UNOBSERVED, ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
 

@@ -26,7 +26,7 @@ from harness.bench.acquisition_channels import (
     judge,
     readings_of_capture,
 )
-from harness.bench.reading import Reading
+from harness.bench.device import Reading
 
 CALIBRATION = shipped_acquisition("acquisition_bench")
 RATE = 50e3

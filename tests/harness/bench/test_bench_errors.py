@@ -7,7 +7,7 @@ import pytest
 
 from harness.agreement.place_noise import PlaceNoise
 from harness.basics.errors import WrongUse
-from harness.bench.bench_errors import USUAL, BenchErrors
+from harness.bench.gap import USUAL, BenchErrors
 from harness.bench.named_files import SHIPPED
 from harness.bench.station_file import Station, load_station, station_from_json
 

@@ -22,8 +22,8 @@ from harness.bench.acquisition_channels import (
     block_channel,
     readings_of_capture,
 )
-from harness.bench.device import ImpactHammer, Microphone
-from harness.bench.listening import MARGIN, capture
+from harness.bench.device import Channel, ImpactHammer, Microphone, Reading
+from harness.bench.instruments.sound import MARGIN, capture
 from harness.bench.microphone_take import (
     BAD,
     CLOCK_FIELDS,
@@ -36,7 +36,6 @@ from harness.bench.microphone_take import (
 )
 from harness.bench.microphone_take import CLOCK as CARD_CLOCK
 from harness.bench.microphone_take import FLAGS as CARD_FLAGS
-from harness.bench.reading import Channel, Reading
 
 CALIBRATION = shipped_acquisition("acquisition_sound_card")
 BOX, CARD = 50e3, 48e3

@@ -13,7 +13,7 @@ from mcap.reader import make_reader
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused
 from harness.bench.acquisition_channels import FORCE, PRESSURE, block_channel
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Reading
 from harness.recording.recording import Recording, RunHeader
 from harness.recording.step_file import Step, codec_of
 from harness.recording.wav_export import export_wav

@@ -18,8 +18,7 @@ from harness.effects.touch_press import press_gel, press_heights
 from harness.objects.household import build
 from harness.sim.gel.gel import deform
 from harness.sim.gel.height_file import Heights
-from harness.sim.optics.known_gel import known_gel
-from harness.sim.optics.pressed_gel import Gel
+from harness.sim.optics.known_gel import Gel, known_gel
 from harness.sim.optics.shadow import ShadowTable
 from harness.sim.optics.tactile_calibration import shipped_calibration
 

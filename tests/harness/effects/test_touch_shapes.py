@@ -25,7 +25,7 @@ from harness.effects.quantities import Quantities
 from harness.objectfile.file import ObjectFile, create_object
 from harness.objectfile.touch.touch import open_touch
 from harness.sim.gel.gel import R15_SKIRT
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.press_pose import Presses
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples import touch_bench as tb
 from tests.samples.object_bench import PROVENANCE
@@ -175,7 +175,7 @@ from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.gel.press_pose import contact_place, gel_from_object
 from harness.sim.optics.tactile_calibration import shipped_calibration
-from harness.sim.optics.pressed_gel import Gel
+from harness.sim.optics.known_gel import Gel
 from harness.effects.touch_press import press_gel
 TOUCH = {"harness.objectfile.touch.touch", "harness.objectfile.touch.level", "onnx", "onnxruntime"}
 mesh = ObjectFile.open(Path(sys.argv[1])).mesh

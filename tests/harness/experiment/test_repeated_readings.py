@@ -5,7 +5,7 @@ import pytest
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import OutOfDomain
-from harness.bench.bench_errors import USUAL
+from harness.bench.gap import USUAL
 from harness.experiment.repeated_readings import PlaceTolerance, group_by_place, weigh_repeated
 
 TOLERANCE = PlaceTolerance(lateral=2e-3, axial=4e-3, tilt=float(np.radians(5.0)))

@@ -128,7 +128,7 @@ WRITER = """
 import sys, numpy as np
 from pathlib import Path
 from harness.recording.recording import Recording
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Reading
 from harness.recording.step_file import Step
 recording = Recording(Path(sys.argv[1]))
 channel = Channel("arm.joints", "rad", (6,), "float64")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import BenchFault
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Reading
 from harness.recording.recording import Recording, RunHeader
 from harness.recording.session import Quiet, perform
 from harness.recording.step_file import Step

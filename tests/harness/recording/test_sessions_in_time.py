@@ -8,7 +8,7 @@ import pytest
 
 from harness.basics.clock import clock_offset_ns
 from harness.basics.errors import WrongUse
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Reading
 from harness.recording import recording as recording_module
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step, read_wall_span

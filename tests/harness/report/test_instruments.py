@@ -8,8 +8,7 @@ import pytest
 
 from harness.bench.acquisition import shipped_acquisition
 from harness.bench.acquisition_channels import BLOCK, FLAGS, FORCE, PRESSURE, block_channel
-from harness.bench.device import Health
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Health, Reading
 from harness.bench.station_file import load_station, station_path
 from harness.recording.run_folder import RunFiles
 from harness.report.run_page import artefacts, instruments, samples

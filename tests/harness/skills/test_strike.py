@@ -13,8 +13,8 @@ from experiments.contact_localization.section import Localization
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault, WrongUse
 from harness.basics.geometry import translation
+from harness.bench.device import Channel, Reading
 from harness.bench.named_files import SHIPPED
-from harness.bench.reading import Channel, Reading
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import STRIKE, Bench
 from harness.bench.station_file import Station, load_station, station_path

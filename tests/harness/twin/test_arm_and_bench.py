@@ -14,10 +14,9 @@ from harness.bench import kinematics
 from harness.bench.sensor import GELSIGHT_R15
 from harness.bench.ur_tables import ARM_TABLES, LINKS, arm_table
 from harness.objects.household import build
-from harness.twin.arm import add_arm, arm_parts, link_from_previous, reaches
-from harness.twin.bench import TwinBench
+from harness.twin.bench import TwinBench, add_arm, arm_parts, link_from_previous, reaches
 from harness.twin.link_hulls import link_hulls, placed
-from harness.twin.sweep import sweep
+from harness.twin.ways import sweep
 
 TOOL = translation(np.array([0.0, 0.0, 0.12]))
 OVER_TABLE = np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])  # the gel points down

@@ -25,8 +25,7 @@ from harness.twin.bench import TwinBench
 from harness.twin.compare import compare_arm, compare_contact
 from harness.twin.motion import PlannedContact, plan_contact, reachable
 from harness.twin.rehearsal import Segment, contact_point, rehearse
-from harness.twin.sweep import sweep
-from harness.twin.ways import LONGEST_MOVE, connect, search
+from harness.twin.ways import LONGEST_MOVE, connect, search, sweep
 
 TOOL = translation(np.array([0.0, 0.0, 0.12]))
 BASE_FROM_OBJECT = translation(np.array([-0.42, 0.0, 0.25]))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.basics.geometry import translation
-from harness.basics.mesh_hull import closed_hull
+from harness.basics.mesh import closed_hull
 from harness.bench.sensor import GELSIGHT_R15
 from harness.twin.bench import TwinBench
 from harness.twin.motion import FARTHEST, STAND_OFF, stand_off_outside

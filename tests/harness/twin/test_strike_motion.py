@@ -9,11 +9,9 @@ from harness.basics.geometry import apply, frame_facing, inverse, rotation_from_
 from harness.bench import kinematics
 from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.household import build
-from harness.twin.arm import NAME
-from harness.twin.bench import TwinBench
-from harness.twin.motion import plan_contact
+from harness.twin.bench import NAME, TwinBench
+from harness.twin.motion import BACK, PlannedStrike, StrikePlanner, plan_contact
 from harness.twin.rehearsal import Segment, rehearse
-from harness.twin.strike_motion import BACK, PlannedStrike, StrikePlanner
 
 TOOL = translation(np.array([0.0, 0.0, 0.12]))
 HAMMER = transform(rotation_from_vector(np.array([0.0, np.pi / 3, 0.0])), np.array([0.1039, 0.0, 0.06]))

@@ -13,7 +13,7 @@ from harness.basics.arrays import ByteArray
 from harness.basics.errors import WrongUse
 from mocks.camera.gelsight_stream import BOUNDARY, MjpegServer, encode, saturated
 from mocks.faults import CAMERA_FAULTS, Fault, parse
-from mocks.ur.faults import KINDS as ARM_FAULTS
+from mocks.ur.serve import KINDS as ARM_FAULTS
 
 
 class Counter:

@@ -16,8 +16,8 @@ from harness.bench.kinematics import forward, nearest_branch
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.arm import CYCLE, NOTICED_AFTER, InProcessArm, Stage
 from mocks.in_process.bench import InProcessCamera
+from mocks.lab import TruthFile
 from mocks.ur.hooks import HOME
-from mocks.world.truth import TruthFile
 from mocks.world.world import NominalBench, World
 
 Press = Callable[[float, float, float], FloatArray]

@@ -8,9 +8,8 @@ import pytest
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.bench.acquisition import strike_from_readings
 from harness.bench.acquisition_channels import BLOCK, CLOCK, FLAG_FIELDS, FLAGS, FORCE, PRESSURE
-from harness.bench.device import ImpactHammer
+from harness.bench.device import ImpactHammer, Reading
 from harness.bench.kinematics import nearest_branch
-from harness.bench.reading import Reading
 from harness.bench.station_file import load_station, station_path
 from mocks.daq.strike_counts import StrikeCounts
 from mocks.in_process.arm import InProcessArm, Stage

@@ -14,8 +14,8 @@ from harness.basics.errors import WrongUse
 from harness.bench.acquisition import shipped_acquisition
 from harness.bench.station_file import load_station, station_path
 from mocks.shared_pose import Firing
+from mocks.sound_card.card import AHEAD, NOISE, CardConverter, PluggedCard, StrikesOnCard, Wire
 from mocks.sound_card.player import MEANWHILE
-from mocks.sound_card.strike_on_card import AHEAD, NOISE, CardConverter, PluggedCard, StrikesOnCard, Wire
 
 CALIBRATION = shipped_acquisition("acquisition_sound_card")
 CONVERTER = CardConverter.of(CALIBRATION)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.basics.mesh import Mesh
-from mocks.world.mesh import ShapeDeviation, split_long_edges
+from mocks.world.gap_draw import ShapeDeviation, split_long_edges
 
 
 def box_mesh(size: tuple[float, float, float]) -> Mesh:

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from experiments.scale_estimation.touch.patch import POINTS, SHARE
+from experiments.scale_estimation.touch.fit import POINTS, SHARE
 from experiments.scale_estimation.unseen.contact_set import GelWay
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh

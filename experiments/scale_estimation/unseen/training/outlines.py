@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from experiments.scale_estimation.unseen.regression import WEIGHTS, Regression, features_of, products
-from experiments.scale_estimation.vision.fit import View
+from experiments.scale_estimation.vision.vision import View
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import transform
-from harness.basics.mesh_hull import hull_of
+from harness.basics.mesh import hull_of
 from harness.picture.camera_errors import CameraErrors
 from harness.picture.outline import SeenOutline, directions
 from harness.sim.solid.household.families import FAMILIES, draw

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from calibration.taxim.arm.plan import PressMotion, PressSettings, places
+from calibration.taxim.arm.press import ball_scene, procedure
 from calibration.taxim.arm.record import read_arm_run
-from calibration.taxim.arm.session import ball_scene, procedure
-from calibration.taxim.arm.settled import look
+from calibration.taxim.arm.touch_down import look
 from harness.basics.errors import CalibrationRefused, NotTouched, WrongUse
 from harness.bench.gap import load_gap
 from harness.bench.sensor import GELSIGHT_R15

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from calibration.taxim.arm.settled import Stillness, settle, unrest_between
+from calibration.taxim.arm.touch_down import Stillness, settle, unrest_between
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault
-from harness.bench.device import Health
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Health, Reading
 
 CHANNEL = Channel("gel.image", "count", (40, 60, 3), "uint8", "gel", 25.0)
 STILL = Stillness()

@@ -8,7 +8,7 @@ import pytest
 from experiments.contact_localization.accuracy.budget import Run
 from experiments.contact_localization.answer import Models, solve
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.dials import SENSES, SPACING, needs_images
+from experiments.contact_localization.posterior.estimate import SENSES, SPACING, needs_images
 from experiments.contact_localization.posterior.policy import read
 from experiments.contact_localization.settings import (
     needs_sound,

@@ -4,7 +4,7 @@ import pytest
 
 from experiments.contact_localization.accuracy.budget import shipped_curve
 from experiments.contact_localization.experiment import EXPERIMENT
-from experiments.contact_localization.posterior.dials import (
+from experiments.contact_localization.posterior.estimate import (
     BLOCK,
     DIALS,
     PARTICLES,

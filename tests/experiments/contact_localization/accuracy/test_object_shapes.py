@@ -14,7 +14,7 @@ from experiments.contact_localization.accuracy.budget import BUDGETS
 from experiments.contact_localization.answer import Models
 from experiments.contact_localization.build_model import model_of_run, model_of_scene
 from experiments.contact_localization.model import Model
-from experiments.contact_localization.posterior.dials import SENSES
+from experiments.contact_localization.posterior.estimate import SENSES
 from experiments.contact_localization.settings import KNOBS, settings
 from harness.basics.errors import WrongUse
 from harness.basics.materials import MATERIALS

@@ -14,7 +14,7 @@ from experiments.contact_localization.accuracy.table import MEASUREMENT, METHODS
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.baselines import mean_random_error
-from experiments.contact_localization.posterior.dials import SPACING
+from experiments.contact_localization.posterior.estimate import SPACING
 from experiments.contact_localization.posterior.policy import read
 from harness.basics.errors import WrongUse
 from harness.basics.symmetry import find_symmetries

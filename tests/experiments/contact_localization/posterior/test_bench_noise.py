@@ -8,10 +8,10 @@ import pytest
 
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.estimate import locate
-from experiments.contact_localization.posterior.noise import Noise, noise_at
+from experiments.contact_localization.posterior.likelihood import Noise, noise_at
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.touch.touch import Contact
-from harness.bench.bench_errors import USUAL
+from harness.bench.gap import USUAL
 from tests.support.localization import dials
 
 QUICK = dials(spacing=3e-3, rounds=2, samples=600)

@@ -13,7 +13,7 @@ from experiments.contact_localization.posterior.consistency import (
     refuse_inside_out,
 )
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
-from experiments.contact_localization.posterior.noise import SAME_AXIS, SAME_PLACE, Noise
+from experiments.contact_localization.posterior.likelihood import SAME_AXIS, SAME_PLACE, Noise
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray

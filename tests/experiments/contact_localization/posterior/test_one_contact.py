@@ -7,7 +7,7 @@ from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.estimate import locate
 from experiments.contact_localization.posterior.grid import on_samples, refine
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
-from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.likelihood import Noise
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray, IntArray

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.noise import Noise
-from experiments.contact_localization.posterior.particle import CANDIDATES, Particles, particle_filter
+from experiments.contact_localization.posterior.estimate import CANDIDATES, Particles, particle_filter
+from experiments.contact_localization.posterior.likelihood import Noise
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.geometry import translation
@@ -89,7 +89,7 @@ def test_where_the_bench_stands_does_not_matter(
 def test_a_hotter_filter_is_less_sure(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
     """``exp(cosine / temperature)``: with temperature 1 it hardly converges, as one contact shows."""
     cool = particle_filter(search, 1, 1000, seed=5)
-    monkeypatch.setattr("experiments.contact_localization.posterior.particle.TEMPERATURE", 1.0)
+    monkeypatch.setattr("experiments.contact_localization.posterior.estimate.TEMPERATURE", 1.0)
     hot = particle_filter(search, 1, 1000, seed=5)
     np.testing.assert_array_equal(cool.points, hot.points)
     assert cool.log_weights == pytest.approx(20.0 * hot.log_weights, abs=1e-9)

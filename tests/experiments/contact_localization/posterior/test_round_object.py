@@ -6,7 +6,7 @@ import trimesh
 
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
-from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.likelihood import Noise
 from experiments.contact_localization.posterior.search import Search
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_about

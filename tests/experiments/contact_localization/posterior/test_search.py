@@ -10,12 +10,12 @@ from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.baselines import without_images
 from experiments.contact_localization.posterior.estimate import SOUND_LEFT_OUT, Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
-from experiments.contact_localization.posterior.noise import Noise, SharedNoise
+from experiments.contact_localization.posterior.likelihood import Noise, SharedNoise
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.posterior.strikes import StrikeEvidence
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.arrays import FloatArray
-from harness.basics.faces.nearest import nearest_point
+from harness.basics.faces.nearest_surface import nearest_point
 from harness.basics.geometry import rotation_about, rotation_from_vector, translation
 from harness.basics.materials import MATERIALS
 from tests.samples import sounding_plate as plate

@@ -17,12 +17,12 @@ from experiments.contact_localization.posterior.estimate import (
     strain_of,
 )
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
-from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.likelihood import Noise
 from experiments.contact_localization.posterior.policy import Readings, estimate_contacts
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.errors import FitRefused
-from harness.bench.bench_errors import USUAL
+from harness.bench.gap import USUAL
 from harness.effects.accuracy import Accuracy
 from tests.support.localization import dials
 

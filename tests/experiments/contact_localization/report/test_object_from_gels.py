@@ -6,7 +6,7 @@ import pytest
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.estimate import locate
-from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.likelihood import Noise
 from experiments.contact_localization.posterior.policy import Readings
 from experiments.contact_localization.report.report import object_from_gels
 from experiments.contact_localization.touch.touch import Contact

@@ -14,7 +14,7 @@ from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.estimate import Estimate, locate
-from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.likelihood import Noise
 from experiments.contact_localization.posterior.policy import Readings
 from experiments.contact_localization.report.result import estimate_of, flags_of
 from experiments.contact_localization.settings import KNOBS

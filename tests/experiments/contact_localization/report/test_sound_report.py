@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from experiments.contact_localization.answer import Answer, ScoredContact
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.dials import SPACING
-from experiments.contact_localization.posterior.estimate import locate
-from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.estimate import SPACING, locate
+from experiments.contact_localization.posterior.likelihood import Noise
 from experiments.contact_localization.posterior.policy import Readings
 from experiments.contact_localization.report.sound_report import contact_time, sound_of, strike_line
 from experiments.contact_localization.settings import KNOBS

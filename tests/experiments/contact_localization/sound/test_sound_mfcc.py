@@ -16,7 +16,7 @@ from experiments.contact_localization.posterior.baselines import (
     mfcc,
     mfcc_filter,
 )
-from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.likelihood import Noise
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.sound.gains import gain_table
 from experiments.contact_localization.touch.touch import Contact

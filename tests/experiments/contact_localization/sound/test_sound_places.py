@@ -8,7 +8,7 @@ from scipy.signal import find_peaks
 
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.hypotheses import Hypotheses, anchors
-from experiments.contact_localization.posterior.noise import Noise
+from experiments.contact_localization.posterior.likelihood import Noise
 from experiments.contact_localization.posterior.posterior import best_point
 from experiments.contact_localization.posterior.search import MOST_HYPOTHESES, Search
 from experiments.contact_localization.posterior.strikes import (

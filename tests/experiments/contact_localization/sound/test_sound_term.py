@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.contact_localization.sound.density import MOST_RANK, add_densities, sound_scores
-from experiments.contact_localization.sound.gains import gain_table
+from experiments.contact_localization.sound.gains import MOST_RANK, add_densities, gain_table, sound_scores
 from experiments.contact_localization.sound.likelihood import (
     SoundNoise,
     SoundTerm,

@@ -11,7 +11,7 @@ from experiments.shape_reconstruction.explore.choosing import (
     lines_at_surface,
     meeting_places,
 )
-from experiments.shape_reconstruction.surface import UNOBSERVED, ShapeEstimate
+from experiments.shape_reconstruction.fits import UNOBSERVED, ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, transform, translation
 from harness.basics.mesh import Mesh

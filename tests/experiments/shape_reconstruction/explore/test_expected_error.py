@@ -17,7 +17,7 @@ from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.kinds import draw_shape
 from experiments.shape_reconstruction.family.rays import first_hit
-from experiments.shape_reconstruction.surface import ShapeEstimate
+from experiments.shape_reconstruction.fits import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import frame_facing, transform

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.explore import running
-from experiments.shape_reconstruction.explore.running import (
+from experiments.shape_reconstruction.explore import explorer
+from experiments.shape_reconstruction.explore.explorer import (
     INFORMATIVE,
     MOST,
     RunningShape,
@@ -15,10 +15,10 @@ from experiments.shape_reconstruction.explore.running import (
     live_estimates,
     live_method,
 )
-from experiments.shape_reconstruction.family.settings import FamilySettings
+from experiments.shape_reconstruction.family.search import FamilySettings
+from experiments.shape_reconstruction.fits import ShapeEstimate
 from experiments.shape_reconstruction.methods import QUICK
 from experiments.shape_reconstruction.smooth.hermite import fit_rbf
-from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.objects.builtin import build
 from tests.experiments.shape_reconstruction.touched import evidence_of, presses
 
@@ -75,6 +75,6 @@ def test_each_estimate_is_given_that_of_a_press_less(monkeypatch: pytest.MonkeyP
         given.append(previous and previous.counts["presses"])
         return replace(fit_rbf(evidence_of(TOUCHES)), counts={"presses": len(evidence.touches)})
 
-    monkeypatch.setattr(running, "continued", continued)
+    monkeypatch.setattr(explorer, "continued", continued)
     RunningShape(INFORMATIVE).after(evidence_of(TOUCHES[:3]))
     assert given == [None, 0, 1, 2]

@@ -14,8 +14,8 @@ from experiments.shape_reconstruction.family.distance import (
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.kinds import CLASSES, draw_shape
+from experiments.shape_reconstruction.smooth.grid import isosurface
 from harness.basics.arrays import FloatArray
-from harness.basics.faces.isosurface import isosurface
 
 DRAWS = 4
 STEEPEST = 1.3

@@ -14,10 +14,9 @@ from experiments.shape_reconstruction.family.contact_fit import ContactFit, disp
 from experiments.shape_reconstruction.family.estimate import _flags, _outliers, fit_family
 from experiments.shape_reconstruction.family.freedom import NuisanceCost
 from experiments.shape_reconstruction.family.posterior import Mixture
-from experiments.shape_reconstruction.family.settings import LEVELS
-from experiments.shape_reconstruction.fits import FamilyFit
+from experiments.shape_reconstruction.family.search import LEVELS
+from experiments.shape_reconstruction.fits import SEEN, TOUCHED, UNOBSERVED, FamilyFit, ShapeEstimate
 from experiments.shape_reconstruction.metric import shape_error
-from experiments.shape_reconstruction.surface import SEEN, TOUCHED, UNOBSERVED, ShapeEstimate
 from experiments.shape_reconstruction.thresholds import (
     BLIND_FACTOR,
     MAX_NUISANCE_COST,

@@ -13,13 +13,18 @@ from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, prior_rows, shape_rows
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.kinds import draw_shape, rarity
-from experiments.shape_reconstruction.family.minimize import PriorRows, cheapest, minimize, total_cost
 from experiments.shape_reconstruction.family.observed import PASS, FamilyEvidence, observe
 from experiments.shape_reconstruction.family.posterior import mixture_of
 from experiments.shape_reconstruction.family.proposals import guides_of, place_sample
 from experiments.shape_reconstruction.family.residuals import evaluate, make_rows, prepared_buffer
-from experiments.shape_reconstruction.family.search import FamilySearch
-from experiments.shape_reconstruction.family.settings import LEVELS
+from experiments.shape_reconstruction.family.search import (
+    LEVELS,
+    FamilySearch,
+    PriorRows,
+    cheapest,
+    minimize,
+    total_cost,
+)
 from experiments.shape_reconstruction.thresholds import SOLID_RARITY
 from harness.basics.geometry import apply, transform, translation
 from tests.support.family_readings import made, nudged

@@ -6,8 +6,7 @@ import pytest
 from experiments.shape_reconstruction.family import revolution_distance as revolution
 from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.kinds import CLASSES, draw_shape, kind_of, rarity_of_size
-from experiments.shape_reconstruction.family.search import FamilySearch
-from experiments.shape_reconstruction.family.settings import LEVELS
+from experiments.shape_reconstruction.family.search import LEVELS, FamilySearch
 from tests.support.family_shapes import surface_of
 from tests.support.shape_readings import look_at, shape_readings, touches_on
 

@@ -99,7 +99,7 @@ _FIT = """
 import numpy as np
 from experiments.shape_reconstruction.family.kinds import CLASSES, draw_shape
 from experiments.shape_reconstruction.family.search import FamilySearch
-from experiments.shape_reconstruction.family.settings import LEVELS
+from experiments.shape_reconstruction.family.search import LEVELS
 from tests.support.family_readings import made
 search, random = FamilySearch(made("mug")[1], LEVELS["coarse"]), np.random.default_rng(3)
 for other in [draw_shape(name, random) for name in CLASSES for _ in range(12)]:

@@ -7,12 +7,12 @@ import pytest
 import trimesh
 
 from experiments.shape_reconstruction.evidence import GuardedTouch
+from experiments.shape_reconstruction.fits import SEEN, TOUCHED, UNOBSERVED, ShapeEstimate
 from experiments.shape_reconstruction.metric import shape_error
 from experiments.shape_reconstruction.smooth.contact_samples import all_samples, thinned
 from experiments.shape_reconstruction.smooth.free_space import CLEARANCE, Silhouette, sensor_depth
 from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.smooth.revolution import find_revolution
-from experiments.shape_reconstruction.surface import SEEN, TOUCHED, UNOBSERVED, ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import apply, inverse, rotation_about, transform

@@ -9,7 +9,7 @@ import trimesh
 from experiments.shape_reconstruction import methods
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import estimate as family
-from experiments.shape_reconstruction.family.settings import CONTINUED
+from experiments.shape_reconstruction.family.search import CONTINUED
 from experiments.shape_reconstruction.methods import METHODS, continued, estimated
 from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.smooth.stated_space import longest_side, max_offset
@@ -110,8 +110,7 @@ def test_the_longest_side_is_that_of_the_box_however_it_is_turned(angle: float) 
 def test_hypotheses_away_from_the_stated_place_or_too_large_are_left_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from experiments.shape_reconstruction.family.search import FamilySearch
-    from experiments.shape_reconstruction.family.settings import LEVELS
+    from experiments.shape_reconstruction.family.search import LEVELS, FamilySearch
 
     found = FamilySearch(TOUCHED, replace(LEVELS["coarse"], draws=42, starts=4, refined=2, hops=0)).run()
     near = found[0]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.shape_reconstruction.smooth.thin_plate import SurfaceData, fitted
+from experiments.shape_reconstruction.smooth.hermite import SurfaceData, fitted
 from harness.basics.arrays import FloatArray
 
 

@@ -19,7 +19,7 @@ from harness.objectfile.touch.nodes import signatures
 from harness.objectfile.touch.skirt import blur_matrix
 from harness.sim.gel.gel import blur, deform, half_kernel
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.press_pose import Presses
 from tests.samples import touch_bench as tb
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from experiments.shape_reconstruction.smooth.grid import isosurface
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import OutOfDomain
-from harness.basics.faces.isosurface import isosurface
 from harness.sim.solid.surface_measure import enclosed_volume
 
 PITCH = 2.0e-3

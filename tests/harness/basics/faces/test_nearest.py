@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.basics.arrays import FloatArray
-from harness.basics.faces.nearest import nearest_point
+from harness.basics.faces.nearest_surface import nearest_point
 from harness.basics.geometry import apply, rotation_from_vector, transform
 from harness.basics.mesh import Mesh
 from harness.sim.solid.surface_samples import random_points

@@ -5,8 +5,7 @@ import pytest
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import MeshRefused
-from harness.basics.faces.nearest import nearest_point
-from harness.basics.faces.nearest_surface import NearestSurface
+from harness.basics.faces.nearest_surface import NearestSurface, nearest_point
 from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
 

@@ -5,8 +5,7 @@ import pytest
 
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.mesh_rays import first_distances, is_inside
-from harness.basics.faces.ray_mesh import RayMesh
-from harness.basics.faces.ray_triangle import ON_EDGE, meeting, triangles_of
+from harness.basics.faces.ray_mesh import ON_EDGE, RayMesh, meeting, triangles_of
 from harness.objects.household import build
 
 FLAT = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

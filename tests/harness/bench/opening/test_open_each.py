@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import BenchFault, ProtectiveStop, TouchstoneError, WrongUse
-from harness.bench.device import ARM, Health
+from harness.bench.device import ARM, Channel, Health, Reading
 from harness.bench.instruments import section as section_module
 from harness.bench.instruments.section import KINDS
-from harness.bench.reading import Channel, Reading
 from harness.bench.station import RunContext, check_bench, open_station, scene_of_all
 from harness.bench.station_file import Station, load_station, station_path
 from harness.commands import check as command

@@ -6,8 +6,7 @@ import numpy as np
 
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
-from harness.bench.device import Health
-from harness.bench.reading import Channel, Reading
+from harness.bench.device import Channel, Health, Reading
 
 CHANNEL = Channel("thermometer.temperature", "K", (), "float64", nominal_rate=10.0)
 

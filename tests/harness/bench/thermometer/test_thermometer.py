@@ -9,10 +9,9 @@ import pytest
 
 from harness.basics.errors import BenchFault, WrongUse
 from harness.bench import mock_lab
-from harness.bench.device import Health
+from harness.bench.device import Health, Reading
 from harness.bench.experiments import EXPERIMENTS
 from harness.bench.instruments.section import KINDS
-from harness.bench.reading import Reading
 from harness.bench.scene import Sensors, scene_from_options
 from harness.bench.station import Bench, Checked, check_bench, open_station
 from harness.bench.station_file import Station, load_station, station_path

@@ -12,7 +12,7 @@ from harness.cli import invoke
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.touch.touch import open_touch
 from harness.picture.image_file import read_image
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.press_pose import Presses
 from tests.samples import touch_bench as tb
 from tests.samples.object_bench import egg_file
 from tests.support.touch_command import answered

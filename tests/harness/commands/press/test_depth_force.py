@@ -18,7 +18,7 @@ from harness.sim.gel.contact_force import contact_force
 from harness.sim.gel.elastic import GelElastic
 from harness.sim.optics.depth_reading import DepthReading, read_force, read_press
 from harness.sim.optics.inverse import DRIFTING
-from harness.sim.optics.pressed_gel import Gel
+from harness.sim.optics.known_gel import Gel
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples.pressed_shapes import Pair, places
 

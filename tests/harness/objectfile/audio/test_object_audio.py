@@ -22,7 +22,7 @@ from harness.objectfile.file import ObjectFile
 from harness.objectfile.npy_file import npy_bytes
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.sim.modal.modes import dampings, nearest_shares
-from harness.sim.sound.modal_radiation import radiation
+from harness.sim.sound.modal_sound import radiation
 from tests.samples.object_bench import (
     MODES,
     NEAR,

@@ -18,8 +18,7 @@ from harness.objectfile.audio.part import with_audio
 from harness.objectfile.audio.strike import MOST_SAMPLES, Place, place_near, place_of_vertex, pushes, strike
 from harness.objectfile.entries import Provenance
 from harness.objectfile.file import ObjectFile, create_object
-from harness.sim.sound.modal_radiation import radiation
-from harness.sim.sound.modal_sound import impulse_response
+from harness.sim.sound.modal_sound import impulse_response, radiation
 from tests.samples.object_bench import MODES, NEAR, egg, egg_modes, egg_part
 
 RATE = 44_100.0

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.basics.geometry import translation
-from harness.basics.mesh_hull import closed_hull
+from harness.basics.mesh import closed_hull
 from harness.report.data import BenchPart, ErrorCurve
 from harness.report.figures.charts import error_chart
 from harness.report.figures.pictures import Heat, box, cylinder

@@ -15,9 +15,9 @@ from harness.bench.sensor import GELSIGHT_R15
 from harness.effects.force import look_up_force
 from harness.effects.touch_press import press_heights
 from harness.sim.gel import contact_force as forces
+from harness.sim.gel.contact_force import ForceTable, read_force_table
 from harness.sim.gel.elastic import GelElastic
-from harness.sim.gel.force_table import ForceTable, read_force_table
-from harness.sim.optics.pressed_gel import Gel
+from harness.sim.optics.known_gel import Gel
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples.pressed_shapes import paraboloid
 

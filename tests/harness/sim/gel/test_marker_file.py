@@ -16,8 +16,7 @@ from harness.basics.toml_file import validate
 from harness.bench.scene import SceneFile
 from harness.bench.sensor import GELSIGHT_R15
 from harness.effects.touch_press import press_heights
-from harness.sim.gel.marker_file import MarkerDot, MarkerFile, read_markers
-from harness.sim.gel.markers import marker_displacements, rest_markers
+from harness.sim.gel.markers import MarkerDot, MarkerFile, marker_displacements, read_markers, rest_markers
 from harness.sim.optics.known_gel import known_gel
 
 ROWS, COLUMNS = GELSIGHT_R15.rows, GELSIGHT_R15.columns

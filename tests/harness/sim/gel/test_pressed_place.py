@@ -7,7 +7,7 @@ from harness.authoring.touch.data import draw_presses
 from harness.basics.errors import OutOfDomain
 from harness.basics.geometry import inverse, transform
 from harness.objectfile.surface_search import SurfaceSearch
-from harness.sim.gel.presses import Presses, presses_of
+from harness.sim.gel.press_pose import Presses, presses_of
 from tests.samples import touch_bench as tb
 
 MESH = tb.peg()

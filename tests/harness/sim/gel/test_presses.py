@@ -5,8 +5,7 @@ import pytest
 
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import frame_facing, inverse
-from harness.sim.gel.press_pose import ContactPlace, gel_from_object
-from harness.sim.gel.presses import Presses, frames_facing
+from harness.sim.gel.press_pose import ContactPlace, Presses, frames_facing, gel_from_object
 
 
 def some(count: int) -> Presses:

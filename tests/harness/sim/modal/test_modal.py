@@ -165,7 +165,7 @@ def test_equal_modes_are_compared_as_what_they_span() -> None:
 
 def test_modes_are_mass_normalised(beam: Tetrahedra) -> None:
     """A rigid body's worth of kinetic energy: sum of m |phi|^2 over the volume is 1."""
-    from harness.sim.modal.lanczos import modes_below
+    from harness.sim.modal.solve import modes_below
 
     mesh = quadratic_mesh(beam.nodes, beam.cells)
     uniform = Elasticity.uniform(STEEL, len(beam.cells))

@@ -9,7 +9,7 @@ from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import DataRefused
 from harness.sim.gel.gel import R15_SKIRT, deform
 from harness.sim.optics.contact_depth import Depth, read_depth
-from harness.sim.optics.inverse_error import ColourError, height_errors
+from harness.sim.optics.depth_reading import ColourError, height_errors
 from harness.sim.optics.optics import Optics
 from harness.sim.optics.tactile_calibration import ColourMisfit, TactileCalibration, shipped_calibration
 from tests.samples.ball_depth import sigma_without

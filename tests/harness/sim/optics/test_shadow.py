@@ -11,9 +11,8 @@ from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import CalibrationRefused, OutOfDomain
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.optics.kernels import change_exactly
-from harness.sim.optics.shadow import Beyond, ShadowTable, cast_shadows, rim
+from harness.sim.optics.shadow import SOFTNESS, Beyond, ShadowTable, cast_shadows, darkened, darkening, rim
 from harness.sim.optics.shadow_file import read_shadow_table
-from harness.sim.optics.shadow_image import SOFTNESS, darkened, darkening
 from harness.sim.optics.tactile_calibration import shipped_calibration
 
 PITCH = 0.0295e-3

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from harness.basics.arrays import FloatArray
-from harness.basics.mesh import Mesh, signed_volume
-from harness.basics.mesh_hull import closed_hull
+from harness.basics.mesh import Mesh, closed_hull, signed_volume
 from harness.sim.solid.surface_measure import enclosed_volume, thin_wall
 from tests.oracles.volume_meshes import box
 

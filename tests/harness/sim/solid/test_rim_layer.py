@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from harness.basics.arrays import FloatArray
 from harness.basics.materials import MATERIALS
+from harness.sim.modal.element_edge import rim_faces, with_rim_layer
 from harness.sim.modal.solve import solve_mesh
 from harness.sim.solid.modal_mesh import quadratic_mesh
-from harness.sim.solid.rim_layer import rim_faces, with_rim_layer
 from harness.sim.solid.tetrahedra import Tetrahedra, tetrahedra
 from tests.oracles.exact_solids import exact_box
 from tests.oracles.mapped_cup import cup

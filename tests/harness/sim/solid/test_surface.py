@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from harness.basics.errors import MeshRefused
-from harness.basics.faces.nearest import nearest_point
+from harness.basics.faces.nearest_surface import nearest_point
 from harness.basics.mesh import Mesh
 from harness.objects.household import build
 from harness.sim.solid.surface_samples import (

@@ -11,8 +11,14 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.materials import MATERIALS
 from harness.sim.modal.modal import solve_modes
-from harness.sim.sound.modal_radiation import AIR_DENSITY, SPEED_OF_SOUND, radiation
-from harness.sim.sound.modal_sound import audible, impulse_response, ring
+from harness.sim.sound.modal_sound import (
+    AIR_DENSITY,
+    SPEED_OF_SOUND,
+    audible,
+    impulse_response,
+    radiation,
+    ring,
+)
 from harness.sim.sound.room import MicrophoneResponse, as_heard, reverberated, room_response
 from tests.oracles.volume_meshes import ball
 from tests.samples.blows import half_sine

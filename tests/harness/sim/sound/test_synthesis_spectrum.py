@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.sim.sound import synthesis_tables
 from harness.sim.sound.synthesis import synthesize
-from harness.sim.sound.synthesis_spectrum import MOST_DECAY, STRETCH, add_modes, may_be_added
+from harness.sim.sound.synthesis_tables import MOST_DECAY, STRETCH, add_modes, may_be_added
 
 RATE = 44.1e3
 

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from mocks.ur.urscript.process import LONGEST_TURN, Process
-from mocks.ur.urscript.program import translate
-from mocks.ur.urscript.tokens import whole_length
+from mocks.ur.urscript.program import translate, whole_length
 from mocks.ur.urscript.values import PoseValue, ScriptError
 
 

@@ -14,8 +14,7 @@ from harness.objectfile.touch.touch import open_touch
 from harness.objectfile.vision.render import open_vision
 from harness.picture.image_file import read_image
 from harness.picture.pinhole import DirectionalLight, Pinhole, unit_vector
-from harness.sim.gel.press_pose import contact_place
-from harness.sim.gel.presses import Presses
+from harness.sim.gel.press_pose import Presses, contact_place
 from tests.samples.look_bench import BOX, box_file
 from tests.samples.object_bench import egg_file
 from tests.samples.touch_bench import ball_file
