@@ -122,12 +122,12 @@ def _uri(uri: str) -> Callable[[Path], Any]:
 
 def _many_members(path: Path) -> None:
     with zipfile.ZipFile(path, "w") as archive:
-        for number in range(120_000):
-            archive.writestr(f"part-number-{number:020d}", "")
+        for number in range(35_000):
+            archive.writestr(f"part-number-{number:0200d}", "")
 
 
 def _zip_bomb(path: Path) -> None:
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for number in range(6):
             with archive.open(f"3D/part{number}.model", "w", force_zip64=True) as stream:
                 for _ in range(100):
@@ -136,7 +136,7 @@ def _zip_bomb(path: Path) -> None:
 
 
 def _text_bomb(start: str, repeated: str, count: int) -> Callable[[Path], Any]:
-    """Make a 3MF whose model repeats an element: kilobytes that unpack to hundreds of megabytes."""
+    """Make a 3MF whose model repeats an element: kilobytes that unpack to megabytes."""
 
     def make(path: Path) -> None:
         begun, ended = model_xml("CUT", "").split("CUT")
@@ -228,7 +228,7 @@ FILES: dict[str, Callable[[Path], Any]] = {
     "own_child.glb": _nodes([{"children": [0], "mesh": 0}]),
     "shared_child.glb": _nodes([{"children": [1, 1]}, {"mesh": 0}]),
     "deep_chain.glb": _nodes(
-        [*({"children": [k + 1], "scale": [1.05] * 3} for k in range(20_000)), {"mesh": 0}]
+        [*({"children": [k + 1], "scale": [1.2] * 3} for k in range(5_000)), {"mesh": 0}]
     ),
     "wide_scene.glb": _nodes([{"mesh": 0}] * 50_000, list(range(50_000))),
     "million_instances.glb": _instances(1_000_000),
@@ -255,8 +255,8 @@ FILES: dict[str, Callable[[Path], Any]] = {
     "triangles.3mf": _text_bomb(
         '<object id="1"><mesh><triangles>', '<triangle v1="0" v2="1" v3="2"/>', 3_000_000
     ),
-    "attribute.3mf": _text_bomb('<object id="1" name="', "aaaaaaaaaaaaaaaa", 20_000_000),
-    "nested.3mf": _text_bomb("", "<a>", 10_000_000),
+    "attribute.3mf": _text_bomb('<object id="1" name="', "aaaaaaaaaaaaaaaa", 200_000),
+    "nested.3mf": _text_bomb("", "<a>", 10_000),
     "doubling.3mf": _components(40, 2),
     "own_component.3mf": _components(3, 1, cycle=True),
     "laughs.3mf": _model(_with_doctype(_LAUGHS, _box_model())),
@@ -280,6 +280,10 @@ FILES: dict[str, Callable[[Path], Any]] = {
     "tiny.dae": _dae(dae_xml(positions="1e-300 " * 23 + "0")),
     "cut.dae": _dae(dae_xml()[:-100]),
 }
+
+
+READ_ONCE = ("vertices.3mf", "triangles.3mf")
+"""Files that take seconds and that the parser of both readings refuses: they are read at intake alone."""
 
 
 def make_all(folder: Path) -> list[Path]:
@@ -318,7 +322,8 @@ def _read_both(path: Path) -> dict[str, Any]:
     from harness.sim.solid.intake import take_in
 
     errors = []
-    for read in (lambda: take_in(path, "m"), lambda: read_appearance(path, "m")):
+    readings = (lambda: take_in(path, "m"), lambda: read_appearance(path, "m"))
+    for read in readings[:1] if path.name in READ_ONCE else readings:
         try:
             read()
             errors.append(("none", ""))

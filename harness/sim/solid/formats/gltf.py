@@ -152,6 +152,8 @@ class _Reader(GltfData):
             waiting += [(child, matrix) for child in reversed(_children(node))]
 
     def _matrix(self, node: dict[str, Any]) -> FloatArray:
+        if not node.keys() & {"translation", "rotation", "scale", "matrix"}:
+            return np.eye(4)
         if "matrix" in node:
             return np.ascontiguousarray(self.numbers(node["matrix"], 16, "a node's matrix").reshape(4, 4).T)
         move = self.numbers(node.get("translation", [0, 0, 0]), 3, "a node's translation")

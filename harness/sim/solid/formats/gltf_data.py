@@ -25,6 +25,8 @@ COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5
 
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _MAX_INDEX = 2**53
+_MAX_JSON_VALUES = 5_000_000
+"""Lists and objects of JSON: so many take 0.5 GB of memory and some seconds."""
 
 
 @dataclass(eq=False)
@@ -235,6 +237,10 @@ def parse_json(data: bytes, name: str) -> dict[str, Any]:
     if len(data) > MOST_JSON and b'"data:' not in data:
         raise MeshRefused(
             f"{name} has {len(data) / 2**20:,.0f} MiB of JSON; at most {MOST_JSON / 2**20:,.0f} MiB are read"
+        )
+    if data.count(b"[") + data.count(b"{") > _MAX_JSON_VALUES:
+        raise MeshRefused(
+            f"{name} holds more than {_MAX_JSON_VALUES:,} lists and objects of JSON, the most that are read"
         )
     try:
         tree = json.loads(data.decode("utf-8-sig"))

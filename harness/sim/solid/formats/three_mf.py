@@ -254,7 +254,7 @@ class _Model:
         if space not in ("", _CORE):
             self._begin_foreign(space, name, attributes)
         elif name == "vertex":
-            self._mesh(name).vertices.extend(self._float(attributes, key) for key in "xyz")
+            self._vertex(self._mesh(name), attributes)
             self.reader.vertices += 1
             if self.reader.vertices > _MAX_VERTICES:
                 raise MeshRefused(
@@ -327,6 +327,12 @@ class _Model:
             raise self.reader.refuse(f"a <{name}> stands outside an object")
         return self.now
 
+    def _vertex(self, now: _Object, attributes: dict[str, str]) -> None:
+        try:
+            now.vertices.extend((float(attributes["x"]), float(attributes["y"]), float(attributes["z"])))
+        except (KeyError, ValueError) as error:
+            raise self.reader.refuse(f"a <vertex> without three numbers: {attributes!r:.80}") from error
+
     def _triangle(self, now: _Object, attributes: dict[str, str]) -> None:
         self.reader.triangles += 1
         require_triangles(self.reader.triangles, self.reader.name)
@@ -358,12 +364,6 @@ class _Model:
             if not np.all(np.isfinite(rows)) or np.linalg.det(matrix[:3, :3]) == 0.0:
                 raise self.reader.refuse(f"a transform is {attributes['transform']!r:.80}")
         return (part, attributes.get("objectid", "")), matrix
-
-    def _float(self, attributes: dict[str, str], key: str) -> float:
-        try:
-            return float(attributes[key])
-        except (KeyError, ValueError) as error:
-            raise self.reader.refuse(f"a <vertex> without a number {key}: {attributes!r:.80}") from error
 
     def _int(self, text: str) -> int:
         try:
