@@ -5,6 +5,8 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 RUN := $(VENV)/.installed
 DEV := $(VENV)/.installed-dev
+# Tests start the program hundreds of times: without bytecode on disk, each start compiles all of it.
+export PYTHONDONTWRITEBYTECODE :=
 # A microphone on a sound card, and a sound card to test it with; all else works without.
 SOUND := pipewire wireplumber pipewire-alsa libportaudio2
 
@@ -27,9 +29,10 @@ $(RUN): $(VENV)/bin/python pyproject.toml constraints.txt
 	@$(PIP) install --constraint constraints.txt --editable .
 	@touch $@
 
-$(DEV): $(RUN)
+$(DEV): $(VENV)/bin/python pyproject.toml constraints.txt
+	@echo "installing into $(VENV) (once; a few minutes)"
 	@$(PIP) install --constraint constraints.txt --editable '.[dev]'
-	@touch $@
+	@touch $(RUN) $@
 
 install: $(RUN) ## the programs, without the developers' tools
 
@@ -54,7 +57,9 @@ objectfiles: $(RUN) ## harness/shipped/objects anew: networks of the sound, touc
 	done; done
 	@rm -rf harness/shipped/objects && mv build/objects harness/shipped/objects
 
-test: $(DEV) sound lint types contracts ## everything CI checks
+test: ## everything CI checks
+	@$(MAKE) --no-print-directory --jobs $(DEV) sound
+	@$(MAKE) --no-print-directory --jobs lint types contracts
 	@$(BIN)/python -m pytest -m "not benchmark and not slow" -n auto --dist loadscope
 
 slow: $(DEV) ## what takes minutes and rarely breaks

@@ -21,7 +21,14 @@ ROOT: Final = TESTS.parent
 WIRES: Final = (
     "wire",
     "drivers",
-    "runs",
+    "runs/test_faults_on_wires.py",
+    "runs/test_killed_while_striking.py",
+    "runs/test_leftovers.py",
+    "runs/test_own_sensor.py",
+    "runs/test_runs_on_wires.py",
+    "runs/test_scale_over_wires.py",
+    "runs/test_shape_over_wires.py",
+    "runs/test_wires_match_process.py",
     "mocks/daq",
     "mocks/ur",
     "mocks/camera/test_gelsight_stream.py",
@@ -69,6 +76,11 @@ class _ByFile(LoadScopeScheduling):  # type: ignore[misc]  # the library is not 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> _ByFile:
     """How tests are shared out."""
     return _ByFile(config, log)
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Count the workers of ``-n auto``: one for each core, and one that mostly waits on wires."""
+    return (os.cpu_count() or 1) + 1
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -1,6 +1,7 @@
 """Six household objects, modelled here: closed, hollow where the real thing is, upright on z = 0."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from itertools import pairwise
 from types import MappingProxyType
 
@@ -22,8 +23,9 @@ _LARGEST_TURN = np.radians(22.0)
 _STEPS_ROUND = 4
 
 
+@lru_cache(maxsize=64)
 def build(name: str, edge: float = 3e-3) -> Mesh:
-    """One of our own objects, in metres.
+    """Build one of our own objects, in metres; a mesh built before is returned again.
 
     The shape does not depend on ``edge`` beyond the flat faces' distance from the curve
     they stand for; no two values of it share vertices.

@@ -3,6 +3,7 @@
 import gzip
 import json
 import resource
+import struct
 import sys
 import time
 import zlib
@@ -22,10 +23,14 @@ GMSH = "$MeshFormat\n{} 0 8\n$EndMeshFormat\n"
 
 
 def _packed(line: bytes, size: int) -> bytes:
-    """Compress a line that is repeated up to a size."""
-    packer = zlib.compressobj(9, wbits=31)
+    """Compress a line that is repeated up to a size: a block is compressed once and its bytes are repeated."""
+    packer = zlib.compressobj(9, wbits=-15)
     block = line * (2**20 // len(line))
-    return b"".join([*(packer.compress(block) for _ in range(size // len(block))), packer.flush()])
+    packed, count, checksum = packer.compress(block) + packer.flush(zlib.Z_FULL_FLUSH), size // len(block), 0
+    for _ in range(count):
+        checksum = zlib.crc32(block, checksum)
+    head, tail = gzip.compress(b"")[:10], struct.pack("<II", checksum, count * len(block) % 2**32)
+    return head + packed * count + packer.flush() + tail
 
 
 def _instances() -> str:

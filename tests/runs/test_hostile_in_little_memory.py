@@ -131,7 +131,7 @@ GRAPHS: dict[str, Callable[[], bytes]] = {
 def _zeros(path: Path, name: str, gigabytes: float, head: bytes = b"") -> None:
     """An archive of few megabytes with one member of zeros."""
     with (
-        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive,
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
         archive.open(name, "w", force_zip64=True) as member,
     ):
         member.write(head)
