@@ -1,6 +1,7 @@
 """Fixtures that every test may ask for, and which tests may run side by side."""
 
 import functools
+import gc
 import os
 from pathlib import Path
 from typing import Final
@@ -38,6 +39,17 @@ WIRES: Final = (
 )
 """Where processes keep each other's deadlines: one at a time, and before all that only computes."""
 
+LONG: Final = (
+    "wires",
+    "runs/test_wheel.py",
+    "runs/test_hostile_meshes.py",
+    "runs/test_budget.py",
+)
+"""Groups that take longest: they begin first, so that none is left when the other workers have ended."""
+
+# At Python's thresholds, garbage collection takes a fifth of the CPU time of collecting the tests.
+gc.set_threshold(50_000, 20, 20)
+
 # One commit gets one verdict; `make hunt` draws other cases every time.
 # A case's duration depends on how busy the machine is; tests/support/cpu_limit.py limits CPU time.
 settings.register_profile("verdict", derandomize=True, deadline=None)
@@ -72,6 +84,12 @@ class _ByFile(LoadScopeScheduling):  # type: ignore[misc]  # the library is not 
     def _split_scope(self, nodeid: str) -> str:
         return _group(ROOT / nodeid.split("::")[0])
 
+    def _assign_work_unit(self, node: object) -> None:
+        first = next((group for group in LONG if group in self.workqueue), None)
+        if first is not None:
+            self.workqueue.move_to_end(first, last=False)
+        super()._assign_work_unit(node)
+
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> _ByFile:
     """How tests are shared out."""
@@ -81,6 +99,11 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> _ByFile:
 def pytest_xdist_auto_num_workers() -> int:
     """Count the workers of ``-n auto``: one for each core, and one that mostly waits on wires."""
     return (os.cpu_count() or 1) + 1
+
+
+def pytest_collection_finish() -> None:
+    """Exempt modules and test items from garbage collection: they stay until the end."""
+    gc.freeze()
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -23,7 +23,7 @@ GMSH = "$MeshFormat\n{} 0 8\n$EndMeshFormat\n"
 
 
 def _packed(line: bytes, size: int) -> bytes:
-    """Compress a line that is repeated up to a size: a block is compressed once and its bytes are repeated."""
+    """Compress a line that is repeated up to a size: one block is compressed, and its bytes are repeated."""
     packer = zlib.compressobj(9, wbits=-15)
     block = line * (2**20 // len(line))
     packed, count, checksum = packer.compress(block) + packer.flush(zlib.Z_FULL_FLUSH), size // len(block), 0
