@@ -50,7 +50,7 @@ class Whole:
 def started(folder: Path) -> RunProcess:
     """A run whose folder has just been made."""
     program = RunProcess([*MUG, "--out", str(folder / "run")], folder)
-    program.wait_for((folder / "run" / "run.json").exists, 60.0)
+    program.wait_for((folder / "run" / "run.json").exists, PATIENCE)
     return program
 
 
@@ -67,7 +67,7 @@ def hashes(folder: Path) -> dict[Path, str]:
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
     folder = tmp_path_factory.mktemp("whole")
     program = started(folder)
-    program.wait_for(lambda: contact_begun(folder), 60.0)
+    program.wait_for(lambda: contact_begun(folder), PATIENCE)
     ports = program.ports()
     assert len(ports) >= 4, "dashboard, script, real-time exchange, gel"
     code, result = program.finish(PATIENCE)
@@ -111,7 +111,7 @@ def test_kill_loses_at_most_the_step_in_flight(whole: Whole, tmp_path: Path, kil
     program = started(tmp_path)
     draw = random.Random(kill)
     contacts = draw.randrange(len(PHASES))
-    program.wait_for(lambda: len(hashes(tmp_path / "run" / "steps")) >= contacts, 120.0)
+    program.wait_for(lambda: len(hashes(tmp_path / "run" / "steps")) >= contacts, PATIENCE)
     time.sleep(draw.random() * PHASES[contacts])
     assert not program.ended(), "it is to be killed while it runs"
     ports = program.ports()
@@ -129,10 +129,10 @@ def test_kill_loses_at_most_the_step_in_flight(whole: Whole, tmp_path: Path, kil
 @pytest.mark.slow  # in process in test_run.py; twice stays here
 def test_ctrl_c_once_ends_after_the_contact(whole: Whole, tmp_path: Path) -> None:
     program = started(tmp_path)
-    program.wait_for(lambda: contact_begun(tmp_path), 60.0)
+    program.wait_for(lambda: contact_begun(tmp_path), PATIENCE)
     ports = program.ports()
     program.interrupt()
-    code, said = program.finish(60.0)
+    code, said = program.finish(PATIENCE)
     assert code == said["exit_code"] == 130, program.said
     assert "contact 1; " in said["error"]
     assert program.left(ports) == ([], set())
@@ -144,12 +144,12 @@ def test_ctrl_c_once_ends_after_the_contact(whole: Whole, tmp_path: Path) -> Non
 
 def test_ctrl_c_twice_stops_now(tmp_path: Path) -> None:
     program = started(tmp_path)
-    program.wait_for(lambda: contact_begun(tmp_path), 60.0)
+    program.wait_for(lambda: contact_begun(tmp_path), PATIENCE)
     ports = program.ports()
     program.interrupt()
     time.sleep(0.2)
     program.interrupt()
-    code, said = program.finish(20.0)
+    code, said = program.finish(PATIENCE)
     assert code == said["exit_code"] == 130, program.said
     assert "Traceback" not in program.said
     assert program.left(ports) == ([], set())

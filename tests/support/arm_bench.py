@@ -47,7 +47,7 @@ class FarEnd:
 
     def program(self, text: str, port: int = 30002) -> None:
         """Send a program, as another computer would."""
-        with socket.create_connection((self.address, port), timeout=2.0) as link:
+        with socket.create_connection((self.address, port), timeout=30.0) as link:
             link.sendall(text.encode())
 
     def ask(self, command: str) -> str:
@@ -67,7 +67,7 @@ class FarEnd:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.close()
-        self._process.wait(5.0)
+        self._process.wait(60.0)
         self._process.stdout.close()
 
     def _tell(self, message: dict[str, Any]) -> dict[str, Any]:

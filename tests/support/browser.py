@@ -119,7 +119,7 @@ def shown(url: str) -> Iterator[Page]:
     finally:
         process.terminate()
         with suppress(subprocess.TimeoutExpired):
-            process.wait(10.0)
+            process.wait(60.0)
         process.kill()
         os.close(to)
         os.close(of)

@@ -38,7 +38,7 @@ class Relay:
             listener.shutdown(socket.SHUT_RDWR)
             listener.close()
         for thread in self._threads:
-            thread.join(2.0)
+            thread.join(30.0)
 
     def _begin(self, work: object, *arguments: object) -> None:
         assert callable(work)

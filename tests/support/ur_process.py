@@ -42,7 +42,7 @@ class UrProcess:
 
     def end(self) -> int:
         """Close its input; its exit status."""
-        self.process.communicate(timeout=10.0)
+        self.process.communicate(timeout=PATIENCE)
         return self.process.returncode
 
     def cue(self, kind: str, seconds: float | None = None) -> None:
@@ -55,7 +55,7 @@ class UrProcess:
 
     def ask(self, command: str) -> str:
         """One line to the dashboard, one line back."""
-        with socket.create_connection((self.host, 29999), timeout=5.0) as link:
+        with socket.create_connection((self.host, 29999), timeout=PATIENCE) as link:
             lines = link.makefile("rwb")
             assert lines.readline() == b"Connected: Universal Robots Dashboard Server\n"
             lines.write(command.encode() + b"\n")
@@ -86,10 +86,13 @@ def is_free(host: str, port: int) -> bool:
     return True
 
 
-def wait_until(condition: Callable[[], bool], seconds: float) -> float:
-    """Seconds until the condition held; fails where it does not within ``seconds``."""
-    start = time.monotonic()
+PATIENCE = 30.0
+"""s after which a condition counts as never met: a busy computer makes processes late."""
+
+
+def wait_until(condition: Callable[[], bool], seconds: float = PATIENCE) -> None:
+    """Wait until a condition is met; fail if it is not within ``seconds``."""
+    end = time.monotonic() + seconds
     while not condition():
-        assert time.monotonic() < start + seconds, f"not within {seconds} s"
+        assert time.monotonic() < end, f"not within {seconds} s"
         time.sleep(0.001)
-    return time.monotonic() - start

@@ -42,6 +42,6 @@ def at_home(control: Any) -> None:
     """The program runs, the tool is the flange, and the arm is where every test may begin."""
     if not control.isProgramRunning():
         assert control.reuploadScript()
-        wait_until(control.isProgramRunning, 2.0)
+        wait_until(control.isProgramRunning)
     assert control.setTcp([0.0] * 6)
     assert control.moveJ(HOME.tolist(), 2.0, 8.0)

@@ -162,7 +162,7 @@ def test_a_driver_that_is_killed_leaves_no_process_and_a_quiet_box(bench: Bench)
         check=False,
     )
     fetcher = Path("/proc") / done.stdout.strip()
-    ends = time.monotonic() + 10.0
+    ends = time.monotonic() + 60.0
     while fetcher.exists() and fetcher.name not in ("", "proc") and time.monotonic() < ends:
         time.sleep(0.05)
     assert done.returncode == -9
@@ -197,7 +197,7 @@ def test_a_loss_between_two_strikes_does_not_spoil_the_next(bench: Bench) -> Non
     with opened(bench) as hammer:
         read_whole(hammer)
         bench.cue("overflow", 0.2)
-        ends = time.monotonic() + 20.0
+        ends = time.monotonic() + 120.0
         while not hammer.health().drops and time.monotonic() < ends:
             time.sleep(0.05)
         read_whole(hammer)

@@ -60,7 +60,7 @@ def test_a_protective_stop_latches_and_nothing_resumes_by_itself(
     mock: UrProcess, receive: Any, control: Any
 ) -> None:
     assert control.moveJ(FAR.tolist(), 0.5, 4.0, True)
-    wait_until(lambda: _moving(receive), 1.0)
+    wait_until(lambda: _moving(receive))
     time.sleep(0.2)
     control.triggerProtectiveStop()  # the script that would confirm it is paused
     wait_until(receive.isProtectiveStopped, 0.5)
@@ -78,11 +78,11 @@ def test_a_protective_stop_latches_and_nothing_resumes_by_itself(
     )
     assert mock.ask("play") == "Failed to execute: play"
     assert mock.ask("stop") == "Stopped"
-    wait_until(lambda: receive.getTimestamp() > stopped_at + 5.1, 10.0)
+    wait_until(lambda: receive.getTimestamp() > stopped_at + 5.1)
     assert mock.ask("unlock protective stop") == "Protective stop releasing"
-    wait_until(lambda: not receive.isProtectiveStopped(), 0.5)
+    wait_until(lambda: not receive.isProtectiveStopped())
     assert control.reuploadScript()
-    wait_until(control.isProgramRunning, 2.0)
+    wait_until(control.isProgramRunning)
     time.sleep(0.2)
     assert receive.getActualQ() == resting
     assert control.moveJ(HOME.tolist(), 1.0, 4.0)
@@ -93,15 +93,15 @@ def test_an_emergency_stop_takes_the_power(mock: UrProcess, receive: Any, contro
     wait_until(receive.isEmergencyStopped, 0.5)
     assert receive.getSafetyStatusBits() == 1 << 6 | 1 << 7 | 1 << 10
     assert (receive.getRobotMode(), receive.getRuntimeState()) == (3, 1)
-    wait_until(lambda: not control.isProgramRunning(), 0.5)  # by a stream of its own
+    wait_until(lambda: not control.isProgramRunning())  # by a stream of its own
     assert mock.ask("power on") == "Failed to execute: power on"
     mock.cue("release_emergency_stop")
     assert mock.ask("power on") == "Powering on"
-    wait_until(lambda: receive.getRobotMode() == 5, 0.5)
+    wait_until(lambda: receive.getRobotMode() == 5)
     assert mock.ask("brake release") == "Brake releasing"
-    wait_until(lambda: receive.getRobotMode() == 7, 0.5)
+    wait_until(lambda: receive.getRobotMode() == 7)
     assert control.reuploadScript()
-    wait_until(control.isProgramRunning, 2.0)
+    wait_until(control.isProgramRunning)
     assert control.moveJ((HOME + 0.05).tolist(), 1.0, 4.0)
 
 
@@ -109,7 +109,7 @@ def test_a_dropped_connection_is_noticed_at_once(mock: UrProcess, receive: Any) 
     stamp = receive.getTimestamp()
     mock.cue("drop", 1.0)
     # As long as for every other state here: mock and library share their cores with other tests.
-    wait_until(lambda: not receive.isConnected(), 0.5)
+    wait_until(lambda: not receive.isConnected())
     with pytest.raises(RuntimeError):
         RTDEReceiveInterface(mock.host, 125.0)
     time.sleep(1.1)
@@ -131,7 +131,7 @@ def test_a_frozen_stream_is_survived_for_about_two_seconds(
     assert receive.isConnected() is survives
     time.sleep(0.5)
     if survives:
-        wait_until(lambda: receive.getTimestamp() > begin + seconds, 1.0)
+        wait_until(lambda: receive.getTimestamp() > begin + seconds)
 
 
 @pytest.mark.parametrize("watchdog", [0.0, 10.0])
@@ -144,7 +144,7 @@ def test_a_client_killed_while_the_arm_moves(mock: UrProcess, receive: Any, watc
     )
     assert client.stdout is not None
     assert client.stdout.readline() == b"connected\n"
-    wait_until(lambda: receive.getActualTCPSpeed()[1] > 0.0199, 3.0)
+    wait_until(lambda: receive.getActualTCPSpeed()[1] > 0.0199)
     os.kill(client.pid, signal.SIGKILL)
     client.communicate()
     killed = receive.getTimestamp()
@@ -153,7 +153,7 @@ def test_a_client_killed_while_the_arm_moves(mock: UrProcess, receive: Any, watc
         assert receive.getTimestamp() - killed < 0.15
         assert receive.getRuntimeState() == 1
     else:
-        wait_until(lambda: receive.getTimestamp() > killed + 0.5, 2.0)
+        wait_until(lambda: receive.getTimestamp() > killed + 0.5)
         assert receive.getActualTCPSpeed()[1] > 0.0199
         assert mock.ask("stop") == "Stopped"
         wait_until(lambda: not _moving(receive), 1.0)
@@ -171,5 +171,5 @@ def test_a_program_killed_at_the_pendant_fails_the_next_command(
     mock: UrProcess, receive: Any, control: Any
 ) -> None:
     mock.cue("kill_program")
-    wait_until(lambda: receive.getRuntimeState() == 1, 0.5)
+    wait_until(lambda: receive.getRuntimeState() == 1)
     assert not control.moveJ(HOME.tolist())

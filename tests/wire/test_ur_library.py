@@ -50,7 +50,7 @@ def test_two_controllers_side_by_side_move_at_the_same_time(receive: Any, contro
         assert control.moveJ(goals[0].tolist(), 1.0, 4.0, True)
         assert other.moveJ(goals[1].tolist(), 1.0, 4.0, True)
         for interface, goal in ((receive, goals[0]), (other_receive, goals[1])):
-            wait_until(lambda i=interface, g=goal: np.abs(i.getActualQ() - g).max() < 1e-6, 3.0)  # type: ignore[misc]
+            wait_until(lambda i=interface, g=goal: np.abs(i.getActualQ() - g).max() < 1e-6)  # type: ignore[misc]
         other.stopScript()
         other.disconnect()
         other_receive.disconnect()
@@ -58,7 +58,7 @@ def test_two_controllers_side_by_side_move_at_the_same_time(receive: Any, contro
 
 def _moving_time(receive: Any, start: Any) -> float:
     """Seconds on the controller's clock from the first cycle that moves to the last."""
-    wait_until(lambda: any(receive.getTargetQd()), 2.0)
+    wait_until(lambda: any(receive.getTargetQd()))
     begin = receive.getTimestamp()
     wait_until(lambda: not any(receive.getTargetQd()), 5.0)
     return float(receive.getTimestamp() - begin)
@@ -83,7 +83,7 @@ def test_a_line_is_straight_and_takes_the_time_of_its_trapezoid(receive: Any, co
     goal = start + np.array([0.0, 0.15, 0.0, 0.0, 0.0, 0.0])
     assert control.moveL(goal.tolist(), 0.1, 0.5, True)
     seen: list[list[float]] = []
-    wait_until(lambda: any(receive.getTargetQd()), 2.0)
+    wait_until(lambda: any(receive.getTargetQd()))
     begin = receive.getTimestamp()
     while any(receive.getTargetQd()):
         seen.append(receive.getActualTCPPose()[:3])
@@ -98,9 +98,9 @@ def test_progress_of_an_asynchronous_move(control: Any) -> None:
     goal[5] += 0.5
     before = control.getAsyncOperationProgressEx().changeCount()
     assert control.moveJ(goal.tolist(), 1.0, 4.0, True)
-    wait_until(lambda: control.getAsyncOperationProgressEx().changeCount() != before, 1.0)
+    wait_until(lambda: control.getAsyncOperationProgressEx().changeCount() != before)
     assert control.getAsyncOperationProgress() >= 0
-    wait_until(lambda: control.getAsyncOperationProgress() < 0, 3.0)
+    wait_until(lambda: control.getAsyncOperationProgress() < 0)
 
 
 @pytest.mark.parametrize("kind", ["joints", "line"])
@@ -109,7 +109,7 @@ def test_an_asynchronous_move_is_stopped_within_150_ms(receive: Any, control: An
         assert control.moveJ((HOME + TURN).tolist(), 0.5, 4.0, True)
     else:
         assert control.moveL([-0.4919, 0.2, 0.5, 2.221441469, 2.221441469, 0.0], 0.1, 1.0, True)
-    wait_until(lambda: max(map(abs, receive.getTargetQd())) > 0.1, 2.0)
+    wait_until(lambda: max(map(abs, receive.getTargetQd())) > 0.1)
     time.sleep(0.1)
     start = receive.getTimestamp()
     control.stopJ(10.0) if kind == "joints" else control.stopL(10.0)
@@ -178,13 +178,13 @@ def test_what_kills_the_script(receive: Any, control: Any, how: str) -> None:
         assert not control.setPayload(99.0, [0.0, 0.0, 0.1])
     else:
         control.speedL([0.0, 0.02, 0.0, 0.0, 0.0, 0.0], 0.5)
-        wait_until(lambda: any(receive.getTargetQd()), 1.0)
+        wait_until(lambda: any(receive.getTargetQd()))
         assert not control.moveJ(HOME.tolist())
-    wait_until(lambda: not control.isProgramRunning(), 1.0)
-    wait_until(lambda: receive.getRuntimeState() == 1, 1.0)
+    wait_until(lambda: not control.isProgramRunning())
+    wait_until(lambda: receive.getRuntimeState() == 1)
     wait_until(lambda: not any(receive.getTargetQd()), 1.0)
     assert control.reuploadScript()
-    wait_until(control.isProgramRunning, 2.0)
+    wait_until(control.isProgramRunning)
     assert control.moveJ((HOME + 0.05 * TURN).tolist(), 3.0, 10.0)
 
 
@@ -202,7 +202,7 @@ def test_real_time_calls_answer_one_call_late(control: Any) -> None:
 def test_speed_moves_until_it_is_stopped(receive: Any, control: Any) -> None:
     start = np.array(receive.getActualTCPPose())
     control.speedL([0.0, 0.05, 0.0, 0.0, 0.0, 0.0], 0.5)
-    wait_until(lambda: receive.getActualTCPSpeed()[1] > 0.0499, 1.0)
+    wait_until(lambda: receive.getActualTCPSpeed()[1] > 0.0499)
     assert control.speedStop(10.0)
     wait_until(lambda: not any(receive.getActualTCPSpeed()), 1.0)
     moved = np.array(receive.getActualTCPPose()) - start
@@ -221,7 +221,7 @@ def test_a_second_control_interface_is_told_that_the_registers_are_taken(
 def test_a_program_of_ones_own_runs_and_is_replaced_again(control: Any) -> None:
     script = 'write_output_float_register(20, 4.5)\n textmsg("from the outside")\n'
     assert control.sendCustomScriptFunction("ours", script)
-    wait_until(control.isProgramRunning, 2.0)
+    wait_until(control.isProgramRunning)
 
 
 def test_waypoints_are_uploaded_with_the_script(receive: Any, control: Any) -> None:

@@ -47,7 +47,7 @@ def test_zeroing_takes_the_bias_out(receive: Any, control: Any) -> None:
 def test_steady_a_while_after_a_move(control: Any) -> None:
     assert control.moveJ((HOME + 0.1 * TURN).tolist(), 3.0, 10.0)
     assert not control.isSteady()
-    wait_until(control.isSteady, 1.0)
+    wait_until(control.isSteady)
 
 
 def test_outputs_are_switched_by_their_masks(mock: UrProcess, receive: Any) -> None:
@@ -62,11 +62,11 @@ def test_outputs_are_switched_by_their_masks(mock: UrProcess, receive: Any) -> N
     for switch, index, bit in switches:
         switched |= 1 << bit
         assert switch(index, True)
-        wait_until(partial(_reads, receive, switched), 1.0)
+        wait_until(partial(_reads, receive, switched))
     assert outputs.setSpeedSlider(0.5)
-    wait_until(lambda: receive.getTargetSpeedFraction() == 0.5, 1.0)
+    wait_until(lambda: receive.getTargetSpeedFraction() == 0.5)
     assert outputs.setSpeedSlider(1.0)
-    wait_until(lambda: receive.getTargetSpeedFraction() == 1.0, 1.0)
+    wait_until(lambda: receive.getTargetSpeedFraction() == 1.0)
     outputs.disconnect()
 
 

@@ -146,7 +146,7 @@ def test_inputs_are_numbered_from_one_and_belong_to_one_client(mock: UrProcess, 
     def free_again() -> bool:
         return client.ask(ord("I"), b"input_int_register_6")[0] > 0
 
-    wait_until(free_again, 1.0)
+    wait_until(free_again)
 
 
 def test_inputs_keep_what_was_written_and_can_be_read_back(client: Client) -> None:
@@ -155,7 +155,7 @@ def test_inputs_keep_what_was_written_and_can_be_read_back(client: Client) -> No
     client.outputs(names.decode(), 500.0)
     client.send(ord("U"), b"\1" + struct.pack(">id?", -42, 2.5, True))
     client.ask(ord("S"))
-    wait_until(lambda: client.receive(ord("U"))[1:] == struct.pack(">id?", -42, 2.5, True), 1.0)
+    wait_until(lambda: client.receive(ord("U"))[1:] == struct.pack(">id?", -42, 2.5, True))
 
 
 def test_data_of_a_wrong_length_ends_the_connection(client: Client) -> None:
@@ -170,7 +170,7 @@ def test_masked_outputs_ignore_what_is_not_masked(client: Client) -> None:
     client.outputs("standard_analog_output0,standard_analog_output1", 500.0)
     client.send(ord("U"), b"\1" + struct.pack(">BBdd", 1, 0, 0.25, 6.9e-310))
     client.ask(ord("S"))
-    wait_until(lambda: client.receive(ord("U"))[1:] == struct.pack(">dd", 0.25, 0.0), 1.0)
+    wait_until(lambda: client.receive(ord("U"))[1:] == struct.pack(">dd", 0.25, 0.0))
 
 
 @pytest.mark.parametrize("port", PORTS)
@@ -210,7 +210,7 @@ def test_bad_programs_stop_and_nothing_else(mock: UrProcess, client: Client, scr
     with socket.create_connection((mock.host, 30002), timeout=3.0) as link:
         link.sendall(script.encode())
     _assert_alive(client)
-    wait_until(lambda: mock.ask("running") == "Program running: false", 3.0)
+    wait_until(lambda: mock.ask("running") == "Program running: false")
 
 
 def _assert_alive(client: Client) -> None:
@@ -230,7 +230,7 @@ def test_end_of_input_ends_the_process_and_frees_the_ports() -> None:
         assert not any(is_free(mock.host, port) for port in PORTS)
         assert mock.end() == 0
         held.close()
-    wait_until(lambda: all(is_free(mock.host, port) for port in PORTS), 2.0)
+    wait_until(lambda: all(is_free(mock.host, port) for port in PORTS))
 
 
 def test_the_process_ends_with_the_parent_that_was_killed() -> None:
@@ -250,4 +250,4 @@ def test_the_process_ends_with_the_parent_that_was_killed() -> None:
     assert not is_free(host, 30004)
     parent.kill()
     parent.communicate()
-    wait_until(lambda: all(is_free(host, port) for port in PORTS), 3.0)
+    wait_until(lambda: all(is_free(host, port) for port in PORTS))

@@ -77,11 +77,11 @@ def test_a_foreign_program_is_stopped_by_the_watch_itself_whatever_else_hangs(
         watch.expect()
         watch.start()
         link.sendall(key_message("PROGRAM_XXX_STARTED", "rtde_control") + STARTED)
-        assert stops.get(timeout=5.0) == "stop"
+        assert stops.get(timeout=60.0) == "stop"
         assert watch.foreign == "'intruder'"
         assert not watch.awaits
         link.sendall(key_message("PROGRAM_XXX_STARTED", "rtde_control"))
-        assert stops.get(timeout=5.0) == "stop", "a second one of the driver's name is somebody else's"
+        assert stops.get(timeout=60.0) == "stop", "a second one of the driver's name is somebody else's"
         assert watch.foreign == "'intruder'"
         assert stops.empty()
     while not watch.failure:

@@ -70,7 +70,7 @@ def serve() -> Iterator[Callable[[Conversation], str]]:
 
     yield start
     for thread in threads:
-        thread.join(timeout=5.0)
+        thread.join(timeout=60.0)
     for port in ports:
         port.close()
 
@@ -143,7 +143,7 @@ def test_silence_is_told_and_not_taken_for_the_end(serve: Callable[[Conversation
 
     def conversation(link: socket.socket) -> None:
         agree(link)
-        go.wait(5.0)
+        go.wait(60.0)
         link.sendall(sample(0))
 
     stream = RtdeStream(serve(conversation), 500.0)

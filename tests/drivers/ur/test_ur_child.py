@@ -351,7 +351,7 @@ def test_where_the_brake_hangs_the_program_is_ended_through_the_dashboard(
 
     class Hanging(ScriptedLink):
         def brake(self) -> None:
-            self.done.append("brake" if ended.wait(5.0) else "brake that hung")
+            self.done.append("brake" if ended.wait(60.0) else "brake that hung")
 
     monkeypatch.setattr(dashboard, "stop", stop)
     rig = Rig()

@@ -45,7 +45,7 @@ class Answer:
 
 
 def get(server: LiveServer, path: str, method: str = "GET", host: str | None = None) -> Answer:
-    connection = HTTPConnection("127.0.0.1", server.server_port, timeout=30.0)
+    connection = HTTPConnection("127.0.0.1", server.server_port, timeout=120.0)
     try:
         connection.request(method, path, headers={} if host is None else {"Host": host})
         return Answer(connection.getresponse())
@@ -180,6 +180,6 @@ def test_what_is_stopped_frees_its_port(server: LiveServer) -> None:
     thread.start()
     assert get(other, "/start.json").status == 200
     other.shutdown()
-    thread.join(10.0)
+    thread.join(60.0)
     assert not thread.is_alive()
     LiveServer(server.frames, other.server_port).server_close()

@@ -30,7 +30,7 @@ def create_all(folders: list[Path], seed: int, barrier: Any, queue: Any) -> None
     """Create a run in each folder at the same moment as the other process; puts what came of each."""
     create(folders[0].with_name(f"warm-{seed}"), seed)
     for folder in folders:
-        barrier.wait(60)
+        barrier.wait(300)
         try:
             create(folder, seed)
             queue.put((folder, seed, None))
@@ -47,7 +47,7 @@ def test_of_two_starts_in_one_folder_exactly_one_creates_the_run(tmp_path: Path)
         starter.start()
     outcomes = [queue.get(timeout=120) for _ in range(2 * PAIRS)]
     for starter in starters:
-        starter.join(60)
+        starter.join(300)
     for folder in folders:
         mine = [(seed, refusal) for where, seed, refusal in outcomes if where == folder]
         (winner,) = [seed for seed, refusal in mine if refusal is None]

@@ -79,7 +79,7 @@ def drawn_by_node(tmp_path: Path, surface: KnownSurface) -> dict[str, Any]:
         [node, str(Path(__file__).with_name("turned_canvas.js")), str(script), str(page)],
         capture_output=True,
         check=True,
-        timeout=60,
+        timeout=600,
     )
     found: dict[str, Any] = json.loads(done.stdout)
     return found

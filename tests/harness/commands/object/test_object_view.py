@@ -34,11 +34,11 @@ def test_ctrl_c_ends_it_and_frees_its_port(box: Path) -> None:
             assert running.stdout is not None
             said = json.loads(running.stdout.readline())
             assert said["url"] == f"http://127.0.0.1:{said['port']}/"
-            connection = HTTPConnection("127.0.0.1", said["port"], timeout=30.0)
+            connection = HTTPConnection("127.0.0.1", said["port"], timeout=120.0)
             connection.request("GET", "/frame.png?width=8&height=8")
             assert connection.getresponse().read().startswith(b"\x89PNG")
             running.send_signal(signal.SIGINT)  # with a page still connected
-            out, complaints = running.communicate(timeout=60.0)
+            out, complaints = running.communicate(timeout=300.0)
             connection.close()
         finally:
             running.kill()
