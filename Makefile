@@ -57,6 +57,9 @@ objectfiles: $(RUN) ## harness/shipped/objects anew: networks of the sound, touc
 	done; done
 	@rm -rf harness/shipped/objects && mv build/objects harness/shipped/objects
 
+# Each core has a worker; threads of linear algebra would only wait for each other.
+test slow hunt: export OPENBLAS_NUM_THREADS := 1
+
 test: ## everything CI checks
 	@$(MAKE) --no-print-directory --jobs $(DEV) sound
 	@$(MAKE) --no-print-directory --jobs lint types contracts

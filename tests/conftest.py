@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
 
+from harness.basics.cores import own_cores
 from harness.bench.named_files import SHIPPED
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station_file import Station, load_station
@@ -98,7 +99,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> _ByFile:
 
 def pytest_xdist_auto_num_workers() -> int:
     """Count the workers of ``-n auto``: one for each core, and one that mostly waits on wires."""
-    return (os.cpu_count() or 1) + 1
+    return own_cores() + 1
 
 
 def pytest_collection_finish() -> None:
