@@ -55,8 +55,18 @@ class Calls:
     answers: Counter[object] = field(default_factory=Counter)
 
 
-@pytest.fixture
-def calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
+@dataclass(frozen=True)
+class Whole:
+    """A run that was performed, answered and reported."""
+
+    name: str  #: of the experiment.
+    run: RunFiles
+    calls: Calls
+    result: Mapping[str, Any]
+
+
+def count_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
+    """Count from now on."""
     found = Calls()
 
     def counted(module: object, name: str, count: Callable[..., None]) -> None:
@@ -97,19 +107,27 @@ def accuracy_of(name: str) -> Accuracy:
     return Accuracy.default(named(name).knobs).with_(LEVELS.get(name, {}))
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_each_picture_is_inverted_once_and_each_answer_is_solved_once(
-    name: str, station: Station, tmp_path: Path, calls: Calls
-) -> None:
+@pytest.fixture(scope="module", params=SCENES)
+def whole(
+    request: pytest.FixtureRequest, station: Station, tmp_path_factory: pytest.TempPathFactory
+) -> Whole:
+    name, folder = str(request.param), tmp_path_factory.mktemp("whole")
     experiment, accuracy, written = named(name), accuracy_of(name), list[WrittenAnswer[Answering, object]]()
-    run = RunFiles(begin(experiment, scene_of(name), station, 3, None, tmp_path / "run").recording)
+    run = RunFiles(begin(experiment, scene_of(name), station, 3, None, folder / "run").recording)
 
     def conclude(done: Performed) -> None:
-        written.append(write_answer(experiment, run, accuracy, tmp_path, done.answering))
+        written.append(write_answer(experiment, run, accuracy, folder, done.answering))
 
-    done = perform_on_bench(experiment, run, Quiet(), accuracy=accuracy, conclude=conclude)
-    result = add_report(experiment, written[0], partial(write_run_page, experiment), done.health, tmp_path)
-    assert Path(result["report"]).is_file()
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        calls = count_calls(monkeypatch)
+        done = perform_on_bench(experiment, run, Quiet(), accuracy=accuracy, conclude=conclude)
+        result = add_report(experiment, written[0], partial(write_run_page, experiment), done.health, folder)
+    return Whole(name, run, calls, result)
+
+
+def test_each_picture_is_inverted_once_and_each_answer_is_solved_once(whole: Whole) -> None:
+    run, calls = whole.run, whole.calls
+    assert Path(whole.result["report"]).is_file()
     records = run.recording.steps()
     looks = [record for record in records if record.step.kind == "look"]
     pressed = [record for record in records if "gel.image" in record.readings]
@@ -122,14 +140,9 @@ def test_each_picture_is_inverted_once_and_each_answer_is_solved_once(
     assert set(calls.answers.values()) == {1}
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_no_kernel_is_loaded_between_the_first_step_and_the_answer(
-    name: str, station: Station, tmp_path: Path
-) -> None:
-    experiment = named(name)
-    run = RunFiles(begin(experiment, scene_of(name), station, 3, None, tmp_path / "run").recording)
-    perform_on_bench(experiment, run, Quiet())
-    script = f"from {__name__} import answer_recording; answer_recording({name!r}, {str(tmp_path / 'run')!r})"
+def test_no_kernel_is_loaded_between_the_first_step_and_the_answer(whole: Whole) -> None:
+    folder = str(whole.run.recording.folder)
+    script = f"from {__name__} import answer_recording; answer_recording({whole.name!r}, {folder!r})"
     subprocess.run([sys.executable, "-c", script], check=True)
 
 
