@@ -11,6 +11,7 @@ from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
 
 from harness.basics.cores import own_cores
+from harness.basics.store import default_folder
 from harness.bench.named_files import SHIPPED
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station_file import Station, load_station
@@ -47,6 +48,9 @@ LONG: Final = (
     "runs/test_budget.py",
 )
 """Groups that take longest: they begin first, so that none is left when the other workers have ended."""
+
+# Kernels are kept also by tests that have a cache of their own.
+os.environ.setdefault("NUMBA_CACHE_DIR", str(default_folder() / "kernels"))
 
 # At Python's thresholds, garbage collection takes a fifth of the CPU time of collecting the tests.
 gc.set_threshold(50_000, 20, 20)

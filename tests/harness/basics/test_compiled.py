@@ -42,6 +42,7 @@ def _run(folder: Path, cache: Path) -> list[float]:
     environment = {
         **os.environ,
         "TOUCHSTONE_CACHE": str(cache),
+        "NUMBA_CACHE_DIR": "",
         "PYTHONPATH": os.pathsep.join([str(folder), str(Path.cwd())]),
         "PYTHONDONTWRITEBYTECODE": "1",
     }
