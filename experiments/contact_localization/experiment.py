@@ -2,8 +2,7 @@
 
 from functools import partial
 
-from experiments.contact_localization.accuracy.budget import BUDGETS
-from experiments.contact_localization.accuracy.table import MEASUREMENT
+from experiments.contact_localization.accuracy.measurement import ContactMeasurement
 from experiments.contact_localization.answer import PROGRAM, ContactAnswering
 from experiments.contact_localization.next_contact import ContactChooser
 from experiments.contact_localization.plan import plan
@@ -46,7 +45,7 @@ EXPERIMENT = Experiment(
     sources=sources,
     gives=GIVES,
     report=write,
-    budgets=BUDGETS,
-    measurement=MEASUREMENT,
+    count_steps=lambda scene: scene.section(Localization).contacts,
+    measurement=ContactMeasurement,
     plan_key=PLAN_KEY,
 )

@@ -1,8 +1,8 @@
 """The paper's table of sizes: a mocked run in process, answered by every method, trivial ones too."""
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing, suppress
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -18,8 +18,7 @@ from experiments.paper.scale_networks import (
     spectrogram_of,
 )
 from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
-from experiments.scale_estimation.cells import ScaleCell, scene_of
-from experiments.scale_estimation.experiment import MEASUREMENT
+from experiments.scale_estimation.experiment import ScaleMeasurement
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief, SizeRange, fused
@@ -35,14 +34,12 @@ from harness.basics.errors import DataRefused, FitRefused
 from harness.bench.acquisition import Strike
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
+from harness.experiment.in_process import RunCell, open_run
 from harness.experiment.levels import chosen_levels
-from harness.experiment.lookup import named
-from harness.experiment.plain import perform_in_process
 from harness.experiment.truth import read_truth
 from harness.picture.object_mask import mask_by_background
 from harness.picture.outline import SeenOutline, directions
 from harness.recording.observation import look_pictures
-from harness.recording.run_folder import RunFiles
 
 TRIVIAL = ("random", "constant", "first peak", "outline's area", "outline's box", "contacts' box")
 UNSEEN = (
@@ -80,44 +77,6 @@ PAPER_CM = {"vision": (5.08,), "audio": (4.68,), "touch": (3.51,)}
 """Mean errors on real objects, of networks that do not know the object: ObjectFolder 2.0, table 3."""
 
 FEW = 3
-
-
-def run_cell(
-    cell: ScaleCell, scene: SceneFile, station: Station, recordings: Path | None = None
-) -> dict[str, Any]:
-    """Perform and answer one run; the result as JSON values.
-
-    Raises:
-        DataRefused: nothing was read, or ``[scale] paper_networks`` has no network that may be run.
-    """
-    experiment = named("scale-estimation")
-    stated = scene.section(Scale).paper_networks
-    networks = {} if stated is None else paper_networks(Path(stated))
-    here = scene_of(scene, cell)
-    with closing(perform_in_process(experiment, cell, here, station, recordings)) as case:
-        recording = case.run.files.recording
-        truth = read_truth(recording)
-        if truth is None:
-            raise DataRefused("no instrument read anything in this run: no way to the object was free")
-        run = RunFiles(recording)
-        answering = ScaleAnswering(run, chosen_levels(experiment.knobs, (), run.network_levels))
-        answering.load()  # as a run does while the arm moves: the seconds of a row are of readings alone
-        pictures = None
-        for record in recording.steps():
-            answering.read(record)
-            pictures = look_pictures(record) or pictures
-        true = float(truth.differences["longest_side_m"])
-        rows = _rows(answering, answering.answer(), true)
-        # What the paper's networks answer from the same readings.
-        camera = answering.model.station.camera
-        focal_px = 0.0 if camera is None else camera.focal_length
-        readings = PaperReadings(pictures, focal_px, answering.strikes, answering.patches)
-        for name, (size, seconds) in paper_sizes(networks, readings).items():
-            if isinstance(size, FitRefused):
-                rows[name] = _refused(size, answering, true, seconds)
-            else:
-                rows[name] = _value(size, true, seconds)
-        return {"schema": 1, "cell": vars(cell), "steps": recording.committed, "size_m": true, "rows": rows}
 
 
 def _rows(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[str, Any]:
@@ -338,6 +297,45 @@ def paper_sizes(
     return found
 
 
-TABLE = replace(
-    MEASUREMENT, run_cell=run_cell, methods=METHODS, regions=OURS, gross=MEASUREMENT.gross, published=PAPER_CM
-)
+class ScaleTable(ScaleMeasurement):
+    """The paper's table of sizes."""
+
+    methods = METHODS
+    regions = OURS
+    published = PAPER_CM
+
+    def run_cell(
+        self, cell: RunCell, scene: SceneFile, station: Station, recordings: Path | None = None
+    ) -> dict[str, Any]:
+        """Perform a run, or take it from ``recordings``, and answer it by every method.
+
+        Raises:
+            DataRefused: nothing was read, or ``[scale] paper_networks`` has no network that may be run.
+        """
+        stated = scene.section(Scale).paper_networks
+        networks = {} if stated is None else paper_networks(Path(stated))
+        own = cell.create_scene(scene)
+        with open_run(self.experiment, cell, own, station, recordings) as run:
+            recording = run.recording
+            truth = read_truth(recording)
+            if truth is None:
+                raise DataRefused("no instrument read anything in this run: no way to the object was free")
+            answering = ScaleAnswering(run, chosen_levels(self.experiment.knobs, (), run.network_levels))
+            answering.load()  # as in a run while the arm moves: the seconds of a row are of readings alone
+            pictures = None
+            for record in recording.steps():
+                answering.read(record)
+                pictures = look_pictures(record) or pictures
+            true = float(truth.differences["longest_side_m"])
+            rows = _rows(answering, answering.answer(), true)
+            # The sizes that the paper's networks compute from the same readings.
+            camera = answering.model.station.camera
+            focal_px = 0.0 if camera is None else camera.focal_length
+            readings = PaperReadings(pictures, focal_px, answering.strikes, answering.patches)
+            for name, (size, seconds) in paper_sizes(networks, readings).items():
+                if isinstance(size, FitRefused):
+                    rows[name] = _refused(size, answering, true, seconds)
+                else:
+                    rows[name] = _value(size, true, seconds)
+            steps = recording.committed
+            return {"schema": 1, "cell": vars(cell), "steps": steps, "size_m": true, "rows": rows}

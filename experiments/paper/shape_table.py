@@ -1,7 +1,6 @@
 """The paper's table of shapes: a mocked run in process, answered by every method from its readings."""
 
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,9 +13,9 @@ from experiments.paper.shape_baselines import by_average, by_hull, by_visual_hul
 from experiments.paper.shape_network import SENSES, PaperCompletion, paper_completions
 from experiments.paper.shape_retrieval import LibraryShape, by_retrieval, household_library, library_of
 from experiments.shape_reconstruction.answer import evidence_of
-from experiments.shape_reconstruction.cells import PRESSES, ShapeCell, scene_of
+from experiments.shape_reconstruction.cells import PRESSES
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.experiment import MEASUREMENT, NAME
+from experiments.shape_reconstruction.experiment import ShapeMeasurement
 from experiments.shape_reconstruction.fits import ShapeEstimate
 from experiments.shape_reconstruction.methods import METHODS, estimated
 from experiments.shape_reconstruction.metric import (
@@ -36,11 +35,9 @@ from harness.basics.faces.nearest_surface import NearestSurface
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
-from harness.experiment.experiment import MeasuredColumn
-from harness.experiment.lookup import named
-from harness.experiment.plain import perform_in_process
+from harness.experiment.in_process import RunCell, open_run
+from harness.experiment.measuring import MeasuredColumn
 from harness.experiment.truth import read_truth
-from harness.recording.run_folder import RunFiles
 from harness.sim.solid.surface_samples import random_points
 
 PAPER_CM = {
@@ -51,7 +48,7 @@ PAPER_CM = {
 """Chamfer-L1 of six other, real objects from points to points: ObjectFolder 2.0, table 4."""
 
 COLUMNS = (
-    MeasuredColumn("chamfer_points_m", "published", "mm"),
+    MeasuredColumn("chamfer_points_m", "published", "mm", by_object=True),
     MeasuredColumn("hausdorff95_m", "95 %", "mm"),
     MeasuredColumn("f_score", "F 5 mm", "%"),
     MeasuredColumn("deviation_m", "stated", "mm"),
@@ -140,39 +137,6 @@ ROW_NAMES = (
 """All rows that a run of any number of presses may have, in the order of a table."""
 
 
-def run_cell(
-    cell: ShapeCell, scene: SceneFile, station: Station, recordings: Path | None = None
-) -> dict[str, Any]:
-    """Perform and answer one run; return the result as JSON values.
-
-    Raises:
-        DataRefused: the true surface is unknown, or ``[shape] pcn`` has no network that may be run.
-        WrongUse: ``[shape] library`` is no folder, or holds no shape that can be used.
-    """
-    experiment = named(NAME)
-    here, asked = scene_of(scene, cell), scene.section(ShapeRun)
-    networks = [] if asked.pcn is None else paper_completions(Path(asked.pcn))
-    shapes, left_out = ([], []) if asked.library is None else library_of(Path(asked.library))
-    with closing(perform_in_process(experiment, cell, here, station, recordings)) as case:
-        run = RunFiles(case.run.files.recording)
-        truth = true_surface(run, read_truth(run.recording))
-        if truth is None:
-            raise DataRefused(
-                f"no true surface is beside {run.recording.folder.name}: no instrument read anything in this "
-                "run, or its .truth.npz was taken away; take the run away too, and it is performed again"
-            )
-        evidence = evidence_of(run, run.recording.steps())
-        rows = scored_rows(evidence, truth, here.section(ShapeRun).presses, networks, shapes)
-        return {
-            "schema": 1,
-            "cell": vars(cell),
-            "steps": run.recording.committed,
-            "met": [touch.met for touch in evidence.touches],
-            "left_out": left_out,
-            "rows": rows,
-        }
-
-
 def scored_rows(
     evidence: ShapeEvidence,
     truth: Mesh,
@@ -258,15 +222,45 @@ def _errors(error: ShapeError) -> dict[str, Any]:
         "completeness_m": error.completeness,
         "f_score": error.f_score,
         "hausdorff95_m": error.hausdorff95,
-        "gross": bool(error.chamfer > MEASUREMENT.gross),
+        "gross": bool(error.chamfer > ShapeMeasurement.gross),
     }
 
 
-TABLE = replace(
-    MEASUREMENT,
-    run_cell=run_cell,
-    methods=ROW_NAMES,
-    published=PAPER_CM,
-    columns=COLUMNS,
-    per_object=("error_m", "chamfer_points_m"),
-)
+class ShapeTable(ShapeMeasurement):
+    """The paper's table of shapes."""
+
+    methods = ROW_NAMES
+    published = PAPER_CM
+    columns = COLUMNS
+
+    def run_cell(
+        self, cell: RunCell, scene: SceneFile, station: Station, recordings: Path | None = None
+    ) -> dict[str, Any]:
+        """Perform a run, or take it from ``recordings``, and answer it by every method.
+
+        Raises:
+            DataRefused: the true surface is unknown, or ``[shape] pcn`` has no network that may be run.
+            WrongUse: ``[shape] library`` is no folder, or holds no shape that can be used.
+        """
+        asked = scene.section(ShapeRun)
+        networks = [] if asked.pcn is None else paper_completions(Path(asked.pcn))
+        shapes, left_out = ([], []) if asked.library is None else library_of(Path(asked.library))
+        own = cell.create_scene(scene)
+        with open_run(self.experiment, cell, own, station, recordings) as run:
+            truth = true_surface(run, read_truth(run.recording))
+            if truth is None:
+                raise DataRefused(
+                    f"no true surface is beside {run.recording.folder.name}: no instrument read anything in "
+                    "this run, or its .truth.npz was taken away; take the run away too, and it is performed "
+                    "again"
+                )
+            evidence = evidence_of(run, run.recording.steps())
+            presses = run.scene.section(ShapeRun).presses
+            return {
+                "schema": 1,
+                "cell": vars(cell),
+                "steps": run.recording.committed,
+                "met": [touch.met for touch in evidence.touches],
+                "left_out": left_out,
+                "rows": scored_rows(evidence, truth, presses, networks, shapes),
+            }

@@ -1,10 +1,10 @@
-"""Which runs measure scale estimation: objects, gaps, looks, and whether the shape is known."""
+"""The runs that measure scale estimation: objects, gaps, looks, and whether the shape is known."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from experiments.scale_estimation.section import Scale
 from harness.bench.scene import SceneFile, scene_from_json
+from harness.experiment.in_process import RunCell
 
 LOOKING = ("yes", "no")
 """Whether the camera looks first; where it does not, the first contacts are made blindly."""
@@ -15,46 +15,23 @@ answered from the same readings; where not, they are from contacts that nobody c
 
 
 @dataclass(frozen=True)
-class ScaleCell:
-    """Which run."""
+class ScaleCell(RunCell):
+    """One run."""
 
-    object: str
-    gap: str
-    seed: int
-    look: str
-    shape: str = "known"
+    look: str  #: level of ``LOOKING``.
+    shape: str = "known"  #: level of ``DRAWN``.
 
     @property
     def name(self) -> str:
-        """Of the run's file; a gap may be a path."""
-        drawn = "" if self.shape == "known" else f"-{self.shape}"
-        return f"{self.object}-{self.gap.replace('/', '_')}-{self.look}{drawn}-{self.seed}"
+        """Name of the run's file and folder."""
+        shape = "" if self.shape == "known" else f"-{self.shape}"
+        return f"{self.object}-{self.gap.replace('/', '_')}-{self.look}{shape}-{self.seed}"
 
-    @property
-    def conditions(self) -> dict[str, str]:
-        """What was varied."""
-        return {"gap": self.gap, "look": self.look, "shape": self.shape}
-
-
-def cells(
-    objects: Sequence[str], seeds: Sequence[int], chosen: Mapping[str, Sequence[str]]
-) -> list[ScaleCell]:
-    """All of them, an object's after the other's of one seed."""
-    return [
-        ScaleCell(name, gap, seed, look, shape)
-        for seed in seeds
-        for gap in chosen["gap"]
-        for look in chosen["look"]
-        for shape in chosen["shape"]
-        for name in objects
-    ]
-
-
-def scene_of(scene: SceneFile, cell: ScaleCell) -> SceneFile:
-    """The scene of a table's object, its size hidden and every sense asked for."""
-    tree = scene.model_dump(mode="json", by_alias=True)
-    tree["object"]["scale"] = "hidden"
-    tree["sensors"].update(camera=cell.look == "yes", sound=True, touch=True)
-    # The paper's networks answer a run and change nothing of it: recordings do not depend on them.
-    tree.setdefault(Scale.table, {}).update(shape=cell.shape, paper_networks=None)
-    return scene_from_json(tree, cell.name)
+    def create_scene(self, scene: SceneFile) -> SceneFile:
+        """Create the scene of the run: the size is hidden and every sense is used."""
+        tree = scene.model_dump(mode="json", by_alias=True)
+        tree["object"]["scale"] = "hidden"
+        tree["sensors"].update(camera=self.look == "yes", sound=True, touch=True)
+        # The paper's networks answer a run and change nothing of it: recordings do not depend on them.
+        tree.setdefault(Scale.table, {}).update(shape=self.shape, paper_networks=None)
+        return scene_from_json(tree, self.name)

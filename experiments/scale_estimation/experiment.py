@@ -1,18 +1,17 @@
 """Scale estimation as an experiment: how big is an object of known shape?"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
 
 from experiments.scale_estimation.answer import KNOBS, STARTS, ScaleAnswering
-from experiments.scale_estimation.cells import DRAWN, LOOKING, cells, scene_of
+from experiments.scale_estimation.cells import DRAWN, LOOKING, ScaleCell
 from experiments.scale_estimation.explorer import performer, plan, smallest_error, steps_of
 from experiments.scale_estimation.report import write
 from experiments.scale_estimation.result import lines_of, result_of
 from experiments.scale_estimation.section import Scale
+from harness.bench.scene import SceneFile
 from harness.effects.accuracy import Accuracy, Setting
-from harness.experiment.experiment import Experiment, MeasuredCondition
-from harness.experiment.plain import measure_by_knobs, plain_budgets
+from harness.experiment.experiment import Experiment
+from harness.experiment.measuring import MeasuredCondition, Measurement
 from harness.recording.run_folder import RunFiles
 from harness.skills.exploring.exploration import PLAN_KEY
 
@@ -25,25 +24,27 @@ def _answering(run: RunFiles, accuracy: Accuracy) -> ScaleAnswering:
     return answering
 
 
-_ALL_DIALS = measure_by_knobs(NAME, cells, scene_of, STARTS)
+class ScaleMeasurement(Measurement):
+    """Measurement of scale estimation."""
 
-
-def _settings(thorough: bool, chosen: Mapping[str, Sequence[str]], scenes: Any) -> tuple[Setting, ...]:
-    """Every level of the dial where the shape is known; its default alone where it is not."""
-    settings = _ALL_DIALS.settings(thorough, chosen, scenes)
-    known = "known" in chosen["shape"]
-    return tuple(each for each in settings if known or each[STARTS.name] == STARTS.default)
-
-
-MEASUREMENT = replace(
-    _ALL_DIALS,
-    conditions=(
+    cell = ScaleCell
+    conditions = (
         MeasuredCondition("look", LOOKING, ("yes",), ("yes",)),
         MeasuredCondition("shape", DRAWN, ("known",), ("known",)),
-    ),
-    settings=_settings,
-    counts=(4, 11),
-)
+    )
+    counts = (4, 11)
+
+    def asked(
+        self,
+        thorough: bool,
+        chosen: Mapping[str, Sequence[str]],
+        scenes: Mapping[str, SceneFile],
+        counts: Sequence[int],
+    ) -> list[tuple[int, Setting]]:
+        """List the answers of a run: every level of the knob if a shape is known, its default if none is."""
+        asked = super().asked(thorough, chosen, scenes, counts)
+        return [one for one in asked if "known" in chosen["shape"] or one[1][STARTS.name] == STARTS.default]
+
 
 EXPERIMENT = Experiment(
     name=NAME,
@@ -60,17 +61,15 @@ EXPERIMENT = Experiment(
     sources=lambda _scored: {},  # readings are simulated at the CAD model's size only
     gives=(),
     report=write,
-    measurement=MEASUREMENT,
+    count_steps=steps_of,
+    measurement=ScaleMeasurement,
     plan_key=PLAN_KEY,
     gap="unplaced",
-    observe=(),
     assumed={
         "object": {"scale": "hidden"},
         "sensors": {"camera": True, "sound": True, "touch": True},
     },
     error_key="until",
     smallest_error=smallest_error,
-    budgets=plain_budgets(NAME, steps_of, STARTS),
-    sizes_unknown=True,
     measured="the size and the place of the object are what this run measures",
 )

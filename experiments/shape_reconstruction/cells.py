@@ -1,10 +1,11 @@
 """The runs that measure shape reconstruction: objects, gaps, and where presses lead."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.bench.scene import SceneFile, scene_from_json
+from harness.experiment.in_process import RunCell
+from harness.experiment.subjects import REAL
 
 CHOICES = ("planned", "random", "farthest", "active")
 """Values of ``[shape] choose``."""
@@ -12,7 +13,8 @@ CHOICES = ("planned", "random", "farthest", "active")
 PRESSES = (8, 16, 32)
 """Numbers of presses that a run is answered from; the last is how many it makes."""
 
-MORE_OBJECTS = {
+MESHES = {
+    **REAL,
     "mustard": ("meshes/ycb_sim/006_mustard_bottle/006_mustard_bottle.obj", "m", "plastic"),
     "bleach": ("meshes/ycb_ocrtoc/bleach_cleanser/textured.obj", "m", "plastic"),
     "coffeemug": ("meshes/contactdb_objects/coffeemug.stl", "m", "ceramic"),
@@ -23,51 +25,24 @@ MORE_OBJECTS = {
     "fryingpan": ("meshes/contactdb_objects/fryingpan.stl", "m", "steel"),
     "scissors": ("meshes/ycb_ocrtoc/scissors/textured.obj", "m", "steel"),
 }
-"""Real meshes besides those of every experiment: file, unit and material. Banana, drill, hammer and scissors
+"""Real meshes of a table: file, unit and material. Banana, drill, hammer and scissors
 are of no class of the family."""
 
 
 @dataclass(frozen=True)
-class ShapeCell:
+class ShapeCell(RunCell):
     """One run."""
 
-    object: str
-    gap: str
-    seed: int
-    choose: str
+    choose: str  #: level of ``CHOICES``.
 
-    @property
-    def name(self) -> str:
-        """Name of the run's file; a gap may be a path."""
-        return f"{self.object}-{self.gap.replace('/', '_')}-{self.choose}-{self.seed}"
+    def create_scene(self, scene: SceneFile) -> SceneFile:
+        """Create the scene of the run, with camera and gel.
 
-    @property
-    def conditions(self) -> dict[str, str]:
-        """Conditions of the run by name."""
-        return {"gap": self.gap, "choose": self.choose}
-
-
-def cells(
-    objects: Sequence[str], seeds: Sequence[int], chosen: Mapping[str, Sequence[str]]
-) -> list[ShapeCell]:
-    """List all runs, those of one seed together."""
-    return [
-        ShapeCell(name, gap, seed, choose)
-        for seed in seeds
-        for gap in chosen["gap"]
-        for choose in chosen["choose"]
-        for name in objects
-    ]
-
-
-def scene_of(scene: SceneFile, cell: ShapeCell) -> SceneFile:
-    """Create the scene of a run, with camera and gel.
-
-    It has as many presses as its table ``[shape]`` states, ``PRESSES[-1]`` without one.
-    """
-    tree = scene.model_dump(mode="json", by_alias=True)
-    tree["sensors"].update(camera=True, sound=False, touch=True)
-    # Recordings do not depend on the folders that only answers read.
-    own = {"choose": cell.choose, "library": None, "pcn": None}
-    tree.setdefault(ShapeRun.table, {"presses": PRESSES[-1]}).update(own)
-    return scene_from_json(tree, cell.name)
+        It has as many presses as its table ``[shape]`` states, ``PRESSES[-1]`` without one.
+        """
+        tree = scene.model_dump(mode="json", by_alias=True)
+        tree["sensors"].update(camera=True, sound=False, touch=True)
+        # Recordings do not depend on the folders that only answers read.
+        own = {"choose": self.choose, "library": None, "pcn": None}
+        tree.setdefault(ShapeRun.table, {"presses": PRESSES[-1]}).update(own)
+        return scene_from_json(tree, self.name)

@@ -1,27 +1,28 @@
 """Shape reconstruction as an experiment: what does an object never seen look like?"""
 
-from dataclasses import replace
-
 from experiments.shape_reconstruction.answer import ShapeAnswering
-from experiments.shape_reconstruction.cells import CHOICES, MORE_OBJECTS, cells, scene_of
+from experiments.shape_reconstruction.cells import CHOICES, MESHES, ShapeCell
 from experiments.shape_reconstruction.explore.explorer import performer, plan, smallest_error, steps_of
-from experiments.shape_reconstruction.methods import KNOBS, OWN
+from experiments.shape_reconstruction.methods import KNOBS
 from experiments.shape_reconstruction.report import write
-from experiments.shape_reconstruction.result import lines_of, result_of, write_files
+from experiments.shape_reconstruction.result import lines_of, result_of
 from experiments.shape_reconstruction.section import ShapeRun
-from harness.experiment.experiment import Experiment, MeasuredCondition
-from harness.experiment.plain import measure_by_knobs, plain_budgets
+from harness.experiment.experiment import Experiment
+from harness.experiment.measuring import MeasuredCondition, Measurement
 from harness.skills.exploring.exploration import PLAN_KEY
 
 NAME = "shape-reconstruction"
 
-MEASUREMENT = replace(
-    measure_by_knobs(NAME, cells, scene_of, *OWN),
-    conditions=(MeasuredCondition("choose", CHOICES, ("planned",), ("planned",)),),
-    counts=(9, 17, 33),
-    gross=10.0e-3,
-    subjects=MORE_OBJECTS,
-)
+
+class ShapeMeasurement(Measurement):
+    """Measurement of shape reconstruction."""
+
+    cell = ShapeCell
+    conditions = (MeasuredCondition("choose", CHOICES, ("planned",), ("planned",)),)
+    counts = (9, 17, 33)
+    gross = 10.0e-3
+    subjects = MESHES
+
 
 EXPERIMENT = Experiment(
     name=NAME,
@@ -38,13 +39,11 @@ EXPERIMENT = Experiment(
     sources=lambda _scored: {},  # readings are simulated on an object that is known
     gives=(),
     report=write,
-    files=write_files,
-    measurement=MEASUREMENT,
+    count_steps=steps_of,
+    measurement=ShapeMeasurement,
     plan_key=PLAN_KEY,
-    observe=(),
     assumed={"sensors": {"camera": True, "touch": True}},
     error_key="until",
     smallest_error=smallest_error,
-    budgets=plain_budgets(NAME, steps_of, *OWN),
     measured="the shape and the place of the object are what this run measures",
 )

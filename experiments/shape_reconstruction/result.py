@@ -39,7 +39,7 @@ def true_surface(run: RunFiles, truth: Truth | None) -> Mesh | None:
 
 
 def result_of(scored: ScoredShape) -> dict[str, Any]:
-    """The answer as JSON values; keys carry their unit."""
+    """Create the answer as JSON values; write the surfaces that it names into the folder of the result."""
     answer: ShapeAnswer = scored.found
     truth = true_surface(scored.run, scored.truth)
     estimates = {}
@@ -47,6 +47,9 @@ def result_of(scored: ScoredShape) -> dict[str, Any]:
         one = answer.by_sense.get(sense, _NOT_ASKED)
         if isinstance(one, ShapeEstimate):
             estimates[sense] = _estimate(sense, one, truth, answer.seconds[sense])
+            if scored.folder is not None:
+                scored.folder.mkdir(parents=True, exist_ok=True)
+                write_estimate(one, scored.folder, stem_of(sense))
         else:
             names = (*ERRORS, "deviation_m", "extents_m", "touched", "seen", "not_bounded", "doubtful_m")
             nothing: dict[str, Any] = dict.fromkeys((*names, "flags", "details", "mesh"))
@@ -94,14 +97,6 @@ def _estimate(sense: str, found: ShapeEstimate, truth: Mesh | None, seconds: flo
 def stem_of(sense: str) -> str:
     """Name, without its ending, of a surface's files beside ``result.json``."""
     return f"shape-{sense}"
-
-
-def write_files(scored: ScoredShape, folder: Path) -> None:
-    """Every estimate's surface, as the result names it."""
-    answer: ShapeAnswer = scored.found
-    for sense, one in answer.by_sense.items():
-        if isinstance(one, ShapeEstimate):
-            write_estimate(one, folder, stem_of(sense))
 
 
 def _warnings(scored: ScoredShape, answer: ShapeAnswer) -> list[str]:

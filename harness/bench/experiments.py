@@ -21,8 +21,8 @@ class ExperimentRow:
     section: str | None = None  #: name of its table in a scene file; None where it has none.
     model: str | None = None  #: import string of that table's model.
     tables: str | None = None
-    """import string of the ``Measurement`` that ``touchstone tables`` measures by, with the paper's baselines
-    among its methods; None for the experiment's own."""
+    """import string of the ``Measurement`` of its table, with the paper's baselines among its methods; None
+    for the experiment's own."""
     command: str = "replay"  #: the words after ``touchstone`` that read a run of it again.
 
 
@@ -38,14 +38,14 @@ EXPERIMENTS: dict[str, ExperimentRow] = {
         value="experiments.scale_estimation.experiment:EXPERIMENT",
         section="scale",
         model="experiments.scale_estimation.section:Scale",
-        tables="experiments.paper.scale_table:TABLE",
+        tables="experiments.paper.scale_table:ScaleTable",
     ),
     "shape-reconstruction": ExperimentRow(
         about="What does an object never seen look like?",
         value="experiments.shape_reconstruction.experiment:EXPERIMENT",
         section="shape",
         model="experiments.shape_reconstruction.section:ShapeRun",
-        tables="experiments.paper.shape_table:TABLE",
+        tables="experiments.paper.shape_table:ShapeTable",
     ),
     "calibrate-taxim": ExperimentRow(
         about="How does a tactile camera's gel turn slope into colour?", command="calibrate taxim"

@@ -48,15 +48,20 @@ A = TypeVar("A")
 
 
 def score(
-    experiment: Experiment[R, A], run: RunFiles, accuracy: Accuracy, answering: R | None = None
+    experiment: Experiment[R, A],
+    run: RunFiles,
+    accuracy: Accuracy,
+    answering: R | None = None,
+    folder: Path | None = None,
 ) -> Scored[R, A]:
-    """Answer, and look at the truth where there is one.
+    """Compute the answer, and compare it with the truth if that is known.
 
     Args:
         experiment: that the run is of.
         run: folder of the run.
         accuracy: of the answer.
         answering: that has the readings already; None to take them from the folder.
+        folder: folder of ``result.json``; None if none is written.
 
     Raises:
         WrongUse: the run holds no step yet.
@@ -71,7 +76,7 @@ def score(
     found = experiment.estimate(answering)
     truth, notes = truth_or_notes(recording)
     warnings = (*recording.header.plan.get("warnings", ()), *recording.order_notes(), *notes)
-    scored = Scored(run, answering, found, truth, accuracy, warnings)
+    scored = Scored(run, answering, found, truth, accuracy, warnings, folder=folder)
     return replace(scored, result=experiment.result(scored))
 
 
@@ -133,13 +138,10 @@ def write_answer(
     since: float | None = None,
 ) -> WrittenAnswer[R, A]:
     """Answer, write ``result.json``, publish; the arguments are ``finish``'s."""
-    scored = score(experiment, run, accuracy, answering)
+    scored = score(experiment, run, accuracy, answering, folder)
     result = {**common(experiment, scored), **scored.result, **(more or {})}
     result["warnings"] = [*scored.warnings, *result.get("warnings", ())]
     result["answered_after_s"] = None if since is None else now() - since
-    if experiment.files is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        experiment.files(scored, folder)
     _write(folder / RESULT, result)
     publish(result)
     return WrittenAnswer(scored, result)

@@ -57,7 +57,7 @@ def begin(
     """
     if folder is not None:
         require_unused(folder)
-    if scene.object.is_hidden and not procedure.sizes_unknown:
+    if scene.object.is_hidden and procedure.assumed.get("object", {}).get("scale") != "hidden":
         raise WrongUse(
             f"{procedure.name} needs to know how large the object is, and its size is unknown (--range, or "
             'scale = "hidden" in the scene): give its scale, or find it first with touchstone run '
@@ -71,11 +71,11 @@ def begin(
         for option, value in (("--gap", gap), ("--bench", bench)):
             if value is not None:
                 raise WrongUse(f"{option} is for a mocked bench; this station is a real one: leave it out")
-    if procedure.observe is not None and scene.observe == SceneFile.model_fields["observe"].default:
-        scene = scene.model_copy(update={"observe": procedure.observe})
     known = known_object(scene)
     calibration, acquisition = station_calibration(station), station_acquisition(scene, station)
     if isinstance(procedure, Experiment):
+        if not procedure.gives and scene.observe == SceneFile.model_fields["observe"].default:
+            scene = scene.model_copy(update={"observe": ()})
         require_sources(procedure, scene, station, calibration)
     if procedure.section is not None:
         section = scene.section(procedure.section)

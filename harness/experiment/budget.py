@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Generic
 
 import numpy as np
 
@@ -14,9 +13,9 @@ from harness.cost.curve import Point
 from harness.cost.promise import promise
 from harness.experiment.answer import require_steps
 from harness.experiment.experiment import AnyExperiment
-from harness.experiment.front import Front, budgets_of
-from harness.experiment.solving import Found, ReadingsT, Solved, Solver, Target
-from harness.experiment.tables import measurement_of
+from harness.experiment.front import Front
+from harness.experiment.measuring import measurement_of
+from harness.experiment.solving import AnySolved, Solver, Target
 from harness.recording.run_folder import RunFiles
 
 _NOTHING = 1e-9
@@ -24,11 +23,11 @@ _NOTHING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class BudgetedAnswer(Generic[Found]):
+class BudgetedAnswer:
     """An answer as it was asked for."""
 
     point: Point  #: the setting that gave it.
-    solved: Solved[Found]  #: the answer itself.
+    solved: AnySolved  #: the answer itself.
     seconds: float  #: s on the clock, from readings to answer.
     cpu: float  #: s of CPU time, likewise.
     predicted: float  #: s it was expected to take at most.
@@ -50,14 +49,14 @@ def answer_as_asked(experiment: AnyExperiment, files: RunFiles, front: Front, ta
         WrongUse: the recording holds no step yet.
     """
     require_steps(experiment, files.recording)
-    budgets = budgets_of(experiment)
-    run = budgets.solver(files)
+    measured = measurement_of(experiment)
+    run = measured.solver(files)
     front = front.fitting(run.unfit)
     asked = ask(run, front, target)
-    run.prepare(budgets.finest)
-    readings = run.read(budgets.finest)
-    finest = run.solve(readings, budgets.finest)
-    said, best = run.described(asked.solved), run.described(finest)
+    run.prepare(measured.finest)
+    _, shared = run.read(measured.finest)
+    finest = run.solve(measured.finest)
+    said, best = _described(asked.solved), _described(finest)
     ours, theirs = said["position_m"], best["position_m"]
     known = ours is not None and theirs is not None
     return {
@@ -72,8 +71,8 @@ def answer_as_asked(experiment: AnyExperiment, files: RunFiles, front: Front, ta
         "kept": asked.kept,
         **said,
         "finest": {
-            "setting": measurement_of(experiment).setting_name(budgets.finest),
-            "seconds": readings.shared[1] + finest.wall,
+            "setting": measured.setting_name(measured.finest),
+            "seconds": shared + finest.wall,
             "apart_m": float(np.linalg.norm(np.subtract(ours, theirs))) if known else None,
             **best,
         },
@@ -86,7 +85,12 @@ def answer_as_asked(experiment: AnyExperiment, files: RunFiles, front: Front, ta
     }
 
 
-def ask(run: Solver[ReadingsT, Found], front: Front, target: Target) -> BudgetedAnswer[Found]:
+def _described(solved: AnySolved) -> JsonObject:
+    error = None if solved.found is None else solved.error
+    return {"position_m": solved.position, "error_m": error, "refused": solved.refusal}
+
+
+def ask(run: Solver, front: Front, target: Target) -> BudgetedAnswer:
     """Answer a run as asked; what is prepared before is not counted.
 
     Args:
@@ -111,7 +115,7 @@ def ask(run: Solver[ReadingsT, Found], front: Front, target: Target) -> Budgeted
     return BudgetedAnswer(point, solved, taken[1], taken[0], predicted, promised, kept, tried)
 
 
-def _candidates(run: Solver[ReadingsT, Found], front: Front, target: Target) -> tuple[Point, ...]:
+def _candidates(run: Solver, front: Front, target: Target) -> tuple[Point, ...]:
     """What may be taken, and is prepared for.
 
     For an error its tries; for a budget what fits on a machine as fast as the curve's and, should
@@ -138,38 +142,36 @@ def _candidates(run: Solver[ReadingsT, Found], front: Front, target: Target) -> 
 
 
 def _in_time(
-    run: Solver[ReadingsT, Found], front: Front, seconds: float, candidates: Sequence[Point]
-) -> tuple[Point, Solved[Found], float]:
+    run: Solver, front: Front, seconds: float, candidates: Sequence[Point]
+) -> tuple[Point, AnySolved, float]:
     start = time.perf_counter()
     work = run.work(candidates[0].levels)
     counting = time.perf_counter() - start
     left = max(seconds - counting, _NOTHING)
     found = for_budget(candidates, left, run.object, front.scale, work=work)
-    readings = run.read(found.point.levels)
+    _, spent = run.read(found.point.levels)
     if _shares(found.point):
         # Reading what every such setting needs has shown how fast this machine is now: seconds on the clock
         # that a measured CPU second takes. On the machine of the curve it never counts as less than 1: a
         # single fast reading promises nothing about the rest.
         shared = [s.shared for p in front.points if _shares(p) for s in p.samples]
-        speed = readings.shared[1] / front.scale / float(np.median(shared))
+        speed = spent / front.scale / float(np.median(shared))
         speed = max(1.0, speed) if front.trusted else speed
-        found = for_budget(candidates, left, run.object, speed * front.scale, readings.shared[1], work)
-    return found.point, run.solve(readings, found.point.levels), counting + found.seconds
+        found = for_budget(candidates, left, run.object, speed * front.scale, spent, work)
+    return found.point, run.solve(found.point.levels), counting + found.seconds
 
 
 def _to_error(
-    run: Solver[ReadingsT, Found], front: Front, error: float, candidates: Sequence[Point]
-) -> tuple[Point, Solved[Found], float, tuple[str, ...]]:
+    run: Solver, front: Front, error: float, candidates: Sequence[Point]
+) -> tuple[Point, AnySolved, float, tuple[str, ...]]:
     tried: list[str] = []
-    readings: ReadingsT | None = None
     whole, spent = False, 0.0
     for point in candidates:
         tried.append(point.name)
-        if readings is None or (_shares(point) and not whole):
-            readings, whole = run.read(point.levels), _shares(point)
-            spent += readings.shared[1]
+        if len(tried) == 1 or (_shares(point) and not whole):
+            whole, spent = _shares(point), spent + run.read(point.levels)[1]
         spent = most_seconds(point, run.object, front.scale, spent)
-        solved = run.solve(readings, point.levels)
+        solved = run.solve(point.levels)
         if _promise(run, front, point, solved) <= error:
             break
     return point, solved, spent, tuple(tried)
@@ -180,7 +182,7 @@ def _shares(point: Point) -> bool:
     return any(sample.shared > 0.0 for sample in point.samples)
 
 
-def _promise(run: Solver[ReadingsT, Found], front: Front, point: Point, solved: Solved[Found]) -> float:
+def _promise(run: Solver, front: Front, point: Point, solved: AnySolved) -> float:
     if solved.radius is None or not front.vouches:
         return float("inf")
     return promise(point, solved.radius, run.object)

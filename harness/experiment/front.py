@@ -15,9 +15,9 @@ from harness.cost.provenance import code, machine, stale
 from harness.effects.accuracy import Level, Setting
 from harness.effects.scene_object import known_object
 from harness.experiment.experiment import AnyExperiment
-from harness.experiment.solving import AnyBudgets, Target
+from harness.experiment.measuring import measurement_of
+from harness.experiment.solving import Target
 from harness.experiment.subjects import object_key
-from harness.experiment.tables import measurement_of
 from harness.recording.run_folder import RunFiles
 
 
@@ -62,40 +62,27 @@ class Front:
         return replace(self, points=points)
 
 
-def budgets_of(experiment: AnyExperiment) -> AnyBudgets:
-    """How an experiment keeps a budget.
-
-    Raises:
-        WrongUse: it does not.
-    """
-    if experiment.budgets is None:
-        raise WrongUse(f"{experiment.name} has no --budget and no --error yet; choose levels with --level")
-    return experiment.budgets
-
-
 def front_for(experiment: AnyExperiment, scene: SceneFile, steps: int) -> Front:
-    """The curve of this machine, or the one that came with the program, for runs like this one.
+    """Return the settings of this machine's curve, or of the one that came with the program, for a scene.
 
     Raises:
         WrongUse: nothing like this run was measured.
         DataRefused: this machine's curve is damaged.
     """
-    budgets = budgets_of(experiment)
-    like = budgets.condition(scene)
+    measured = measurement_of(experiment)
+    like = measured.condition(scene)
     path = curve_path(experiment.name)
     own = load(path) if path.exists() else None
-    if own is not None and (own.where(like) or budgets.shipped is None):
-        curve, shipped = own, False
-    elif budgets.shipped is not None:
-        curve, shipped = budgets.shipped(), True
-    else:
+    shipped = None if own is not None and own.where(like) else measured.shipped_curve()
+    curve = shipped or own
+    if curve is None:
         raise WrongUse(
             f"what accuracy costs was not measured on this machine; measure it with `touchstone cost "
             f"{experiment.name}`, or choose levels with --level"
         )
-    reasons = stale(curve, machine(), code(measurement_of(experiment).estimator))
-    front = front_of(experiment, curve, {**like, experiment.plural: steps}, reasons, shipped)
-    return front.fitting(lambda setting: budgets.unfit(scene, setting))
+    reasons = stale(curve, machine(), code(measured.estimator))
+    front = front_of(experiment, curve, {**like, experiment.plural: steps}, reasons, shipped is not None)
+    return front.fitting(lambda setting: measured.unfit(scene, setting))
 
 
 def front_at_hand(experiment: AnyExperiment, run: RunFiles) -> Front | None:
@@ -125,7 +112,7 @@ def front_of(
     Raises:
         WrongUse: nothing like the condition was measured.
     """
-    count, offered = experiment.plural, budgets_of(experiment).offered
+    count, offered = experiment.plural, measurement_of(experiment).offered
     condition, scale = nearest_condition(curve.conditions(), wanted, count)
     measured = curve.where(condition)
     points = tuple(point for point in measured if offered(point.levels)) or measured
@@ -145,7 +132,9 @@ def foresee(experiment: AnyExperiment, scene: SceneFile, target: Target) -> str:
             setting promises the error, or none with so few steps; nothing like this run was measured, or
             the experiment keeps no budgets.
     """
-    front = front_for(experiment, scene, budgets_of(experiment).steps(scene))
+    if experiment.count_steps is None:
+        raise WrongUse(f"{experiment.name} has no --budget and no --error yet; choose levels with --level")
+    front = front_for(experiment, scene, experiment.count_steps(scene))
     name = object_key(scene.object.name, known_object(scene).mesh)
     if target.seconds is None:
         assert target.error is not None

@@ -1,6 +1,8 @@
-"""Runs on the mocked bench without sockets, in simulated time; kept on the disk on request."""
+"""Runs of tables and cost curves on the mocked bench without sockets, in simulated time."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,7 +13,7 @@ from harness.bench.gap import lasting_name
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.experiment.begin import begin
-from harness.experiment.experiment import AnyExperiment, RunCell
+from harness.experiment.experiment import AnyExperiment
 from harness.experiment.perform import IN_PROCESS_BENCH, perform_on
 from harness.experiment.truth import truth_paths
 from harness.recording.recording import Recording
@@ -19,39 +21,61 @@ from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
 
 
-def performed(
+@dataclass(frozen=True)
+class RunCell:
+    """One run of a table or a cost curve; a subclass adds the conditions that it varies as fields."""
+
+    object: str  #: name of the object among the subjects.
+    gap: str  #: reality gap of the mocked bench: a name or a file.
+    seed: int  #: random seed of the plan and of the mocked world.
+
+    @property
+    def conditions(self) -> dict[str, str]:
+        """Conditions of the run by name."""
+        return {name: value for name, value in vars(self).items() if name not in ("object", "seed")}
+
+    @property
+    def name(self) -> str:
+        """Name of the run's file and folder."""
+        return "-".join((self.object, *self.conditions.values(), str(self.seed))).replace("/", "_")
+
+    def create_scene(self, scene: SceneFile) -> SceneFile:
+        """Create the scene of the run from that of its object."""
+        return scene
+
+
+def perform_run(
     experiment: AnyExperiment, cell: RunCell, scene: SceneFile, station: Station, folder: Path
 ) -> Recording:
-    """Plan, rehearse and perform a run.
+    """Plan, rehearse and perform a run on the mocked bench without sockets, in simulated time.
 
     Args:
-        experiment: which.
-        cell: gives its seed and its gap.
-        scene: on the table.
-        station: the bench.
-        folder: of the run, not there yet; the truth comes beside it.
+        experiment: the experiment.
+        cell: the run; only its seed and its gap are used.
+        scene: scene of the run.
+        station: a mocked station.
+        folder: new folder of the run; the truth is written next to it.
     """
-    gap = cell.conditions["gap"]
-    recording = begin(experiment, scene, station, cell.seed, gap, folder).recording
+    recording = begin(experiment, scene, station, cell.seed, cell.gap, folder).recording
     run = RunFiles(recording)
     perform_on(experiment, loaded(IN_PROCESS_BENCH)(run.scene, run.station, run.context), run, Quiet())
     return recording
 
 
-def recorded(
+def record_run(
     experiment: AnyExperiment, cell: RunCell, scene: SceneFile, station: Station, folder: Path
 ) -> Recording:
-    """The run of a cell as it lies in a folder of recordings; performed and put there where it does not.
+    """Return a run from a folder of recordings; it is performed if it is not there.
 
     Args:
-        experiment: which.
-        cell: its name is that of its run's folder.
-        scene: on the table.
-        station: the bench.
-        folder: of all recordings. A run is made aside and moved there when it is whole.
+        experiment: the experiment.
+        cell: the run; its name is that of its folder.
+        scene: scene of the run.
+        station: a mocked station.
+        folder: folder of all recordings. A run is performed in another folder and moved here when complete.
 
     Raises:
-        WrongUse: a run of that name is there, of another scene, seed or gap.
+        WrongUse: a run of that name is there, with another scene, seed or gap.
     """
     path = folder / cell.name
     if path.exists():
@@ -60,18 +84,34 @@ def recorded(
         return found
     folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix=".performing-", dir=folder) as aside:
-        made = performed(experiment, cell, scene, station, Path(aside) / cell.name)
+        performed = perform_run(experiment, cell, scene, station, Path(aside) / cell.name)
         with hold_briefly(path.with_name(f".{path.name}.lock")):
-            if not path.exists():  # where another process was first, its run stays
-                for truth in truth_paths(made):
+            if not path.exists():  # if another process was first, its run stays
+                for truth in truth_paths(performed):
                     if truth.exists():
                         truth.replace(path.parent / truth.name)
-                made.folder.replace(path)
+                performed.folder.replace(path)
         return Recording(path)
 
 
+@contextmanager
+def open_run(
+    experiment: AnyExperiment,
+    cell: RunCell,
+    scene: SceneFile,
+    station: Station,
+    recordings: Path | None = None,
+) -> Iterator[RunFiles]:
+    """Provide the recording of a run, see ``record_run``; a temporary one without a folder of recordings."""
+    folder: AbstractContextManager[str | Path] = (
+        TemporaryDirectory(prefix="touchstone-run-") if recordings is None else nullcontext(recordings)
+    )
+    with folder as path:
+        yield RunFiles(record_run(experiment, cell, scene, station, Path(path)))
+
+
 def _require_same(found: Recording, experiment: AnyExperiment, cell: RunCell, scene: SceneFile) -> None:
-    header, gap = found.header, lasting_name(cell.conditions["gap"])
+    header, gap = found.header, lasting_name(cell.gap)
     differing = [
         name
         for name, there, wanted in (
@@ -92,7 +132,7 @@ def _require_same(found: Recording, experiment: AnyExperiment, cell: RunCell, sc
 
 
 def _within(wanted: object, there: object) -> bool:
-    """Whether all that a scene says is so in a recorded one, which says its defaults too."""
+    """Return whether a recorded scene, which states its defaults too, has every value of a scene."""
     if isinstance(wanted, Mapping) and isinstance(there, Mapping):
         return all(_within(value, there.get(key)) for key, value in wanted.items())
     return bool(wanted == there)

@@ -8,19 +8,18 @@ from pathlib import Path
 from harness.basics.errors import WrongUse
 from harness.basics.whole_file import make_folder
 from harness.bench.experiments import EXPERIMENTS, loaded, require_experiment
-from harness.experiment.experiment import AnyExperiment, Experiment
+from harness.experiment.experiment import AnyExperiment
 from harness.recording.recording import Recording
 
 
 def named(name: str) -> AnyExperiment:
-    """The experiment of this name.
+    """Return the experiment of this name.
 
     Raises:
         WrongUse: there is none.
     """
-    found = loaded(require_experiment(name))
-    assert isinstance(found, Experiment)
-    return found
+    experiment: AnyExperiment = loaded(require_experiment(name))
+    return experiment
 
 
 def experiment_of(recording: Recording) -> AnyExperiment:

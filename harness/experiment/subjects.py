@@ -28,25 +28,18 @@ def find_data_folder() -> Path:
     return Path(named) if named else beside if beside.is_dir() else default_folder() / "data"
 
 
-def objects(
-    data: Path | None, builtin_only: bool = False, more: Mapping[str, tuple[str, str, str]] | None = None
-) -> dict[str, SceneFile]:
-    """Return scenes by the object's name: ours, and the real ones whose mesh file is present.
+def objects(data: Path | None, real: Mapping[str, tuple[str, str, str]] = REAL) -> dict[str, SceneFile]:
+    """Return scenes by the object's name: the built-in ones, and the real ones whose mesh file is present.
 
     Args:
-        data: the data folder; None where it is not there.
-        builtin_only: whether real meshes are left out.
-        more: real meshes that an experiment has beside ``REAL``, as that has them.
+        data: the data folder; None if it is absent.
+        real: real meshes, as ``REAL``.
     """
     scenes = {name: scene_from_options(f"builtin:{name}") for name in MATERIALS}
-    if data is None or builtin_only:
-        return scenes
-    real = {
-        name: scene_from_options(str(data / file), material, units)
-        for name, (file, units, material) in {**REAL, **(more or {})}.items()
-        if (data / file).is_file()
-    }
-    return {**scenes, **real}
+    for name, (file, units, material) in real.items():
+        if data is not None and (data / file).is_file():
+            scenes[name] = scene_from_options(str(data / file), material, units)
+    return scenes
 
 
 def object_key(name: str, mesh: Mesh) -> str:

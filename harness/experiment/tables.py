@@ -2,10 +2,9 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import as_completed
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -14,14 +13,12 @@ from harness.basics.errors import TouchstoneError, WrongUse
 from harness.basics.files.json_file import JsonObject
 from harness.basics.metrics import Interval, bootstrap, mean, median
 from harness.basics.whole_file import write_text_whole
-from harness.basics.worker_pool import worker_pool
-from harness.bench.experiments import EXPERIMENTS, loaded
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import load_station, station_path
-from harness.experiment.experiment import AnyExperiment, AnyMeasurement, Measurement, RunCell
+from harness.experiment.experiment import AnyExperiment
+from harness.experiment.in_process import RunCell
 from harness.experiment.lookup import named
-
-Cell = TypeVar("Cell", bound=RunCell)
+from harness.experiment.measuring import Measurement, dump_scenes, run_each, table_of, workers_of
 
 KEYS = "scene.keys.json"
 """In a table's folder: what ``--set`` changed in the scene of every run there."""
@@ -57,16 +54,16 @@ def measure(
     workers: int,
     recordings: Path | None = None,
 ) -> Iterator[tuple[RunCell, JsonObject]]:
-    """Run what is not on the disk yet; yields every cell's result as it is known.
+    """Perform and answer the runs that have no file yet; yield the result of each run as it is known.
 
     Args:
-        experiment: that the runs are of.
+        experiment: the experiment.
         wanted: the runs.
-        scenes: by object.
-        folder: one JSON file a run.
-        workers: processes; 1 for this one alone.
-        recordings: folder that keeps the runs themselves, and of which those that lie there are answered
-            and not performed; None to keep none.
+        scenes: scenes by object.
+        folder: folder of the results, one JSON file per run.
+        workers: number of processes; 1 for this one alone.
+        recordings: folder that keeps the runs themselves; those in it are answered and not performed again.
+            None to keep none.
     """
     folder.mkdir(parents=True, exist_ok=True)
     missing = []
@@ -76,39 +73,19 @@ def measure(
             yield cell, json.loads(path.read_text(encoding="utf-8"))
         else:
             missing.append(cell)
-    trees = {name: scene.model_dump(mode="json", by_alias=True) for name, scene in scenes.items()}
-    for cell, result in _made(experiment.name, missing, trees, workers, recordings):
-        write_text_whole(folder / f"{cell.name}.json", json.dumps(result, allow_nan=False))
-        yield cell, result
+    answer = partial(_run, experiment.name, dump_scenes(scenes), recordings)
+    with workers_of(workers) as pool:
+        for cell, result in run_each(pool, answer, missing):
+            write_text_whole(folder / f"{cell.name}.json", json.dumps(result, allow_nan=False))
+            yield cell, result
 
 
-def _made(
-    name: str,
-    missing: Sequence[RunCell],
-    trees: Mapping[str, JsonObject],
-    workers: int,
-    recordings: Path | None,
-) -> Iterator[tuple[RunCell, JsonObject]]:
-    if workers == 1:
-        for cell in missing:
-            yield cell, _run(name, cell, trees[cell.object], recordings)
-        return
-    with worker_pool(workers) as pool:
-        running = {pool.submit(_run, name, cell, trees[cell.object], recordings): cell for cell in missing}
-        try:
-            for done in as_completed(running):
-                yield running[done], done.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def _run(name: str, cell: RunCell, tree: JsonObject, recordings: Path | None) -> JsonObject:
-    scene, station = scene_from_json(tree, "the table"), load_station(station_path("mock"))
+def _run(name: str, trees: Mapping[str, JsonObject], recordings: Path | None, cell: RunCell) -> JsonObject:
+    scene, station = scene_from_json(trees[cell.object], "the table"), load_station(station_path("mock"))
     try:
         return table_of(named(name)).run_cell(cell, scene, station, recordings)
     except TouchstoneError as error:
-        # A run that cannot be planned or performed is said to be so; it is no measurement.
+        # A run that cannot be planned or performed is reported as such; it is no measurement.
         return {"schema": 1, "failed": f"{type(error).__name__}: {error}"}
 
 
@@ -135,38 +112,11 @@ def require_same_keys(folder: Path, assignments: Sequence[str]) -> None:
         write_text_whole(noted, json.dumps(wanted))
 
 
-def measurement_of(experiment: AnyExperiment) -> AnyMeasurement:
-    """How an experiment is measured.
+def rows(experiment: AnyExperiment, results: Mapping[RunCell, JsonObject]) -> list[TableRow]:
+    """Compute the rows of the runs measured so far.
 
     Raises:
-        WrongUse: it is not.
-    """
-    if experiment.measurement is None:
-        raise WrongUse(
-            f"{experiment.name} has no tables and no cost curve: it does not say how to measure it"
-        )
-    return experiment.measurement
-
-
-def table_of(experiment: AnyExperiment) -> AnyMeasurement:
-    """Return what the table of an experiment is measured by: the registry's, or else the experiment's own.
-
-    Raises:
-        WrongUse: it is not measured.
-    """
-    row = EXPERIMENTS.get(experiment.name)
-    if row is None or row.tables is None:
-        return measurement_of(experiment)
-    found = loaded(row.tables)
-    assert isinstance(found, Measurement)
-    return found
-
-
-def rows(experiment: AnyExperiment, results: Mapping[Cell, JsonObject]) -> list[TableRow]:
-    """The table of what has been measured so far.
-
-    Raises:
-        WrongUse: nothing has.
+        WrongUse: no run has been performed.
     """
     performed = {cell: result for cell, result in results.items() if "rows" in result}
     if not performed:
@@ -182,14 +132,14 @@ def rows(experiment: AnyExperiment, results: Mapping[Cell, JsonObject]) -> list[
 
 
 def key_of(cell: RunCell) -> Key:
-    """The conditions of a run, in a form that sorts and compares."""
+    """Return the conditions of a run in a form that sorts and compares."""
     return tuple(cell.conditions.items())
 
 
 def by_object(
-    results: Mapping[Cell, JsonObject], condition: Key, value: str = "error_m"
+    results: Mapping[RunCell, JsonObject], condition: Key, value: str = "error_m"
 ) -> dict[str, dict[str, float]]:
-    """Mean in metres, the error where nothing else is named, of every method on every object.
+    """Compute the mean in m of every method on every object: of the error if no other value is named.
 
     Args:
         results: of the cells.
@@ -206,7 +156,7 @@ def by_object(
 
 
 def _row(
-    performed: Mapping[Cell, JsonObject], condition: Key, method: str, measured: AnyMeasurement
+    performed: Mapping[RunCell, JsonObject], condition: Key, method: str, measured: Measurement
 ) -> TableRow:
     found = [
         result["rows"][method]

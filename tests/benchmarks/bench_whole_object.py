@@ -2,7 +2,7 @@
 
 ``PYTHONPATH=. python tests/benchmarks/bench_whole_object.py [object ...] [--profile smoke] [--out FILE]``
 builds the built-in objects and, where the real data is found, the three real meshes of
-``experiments.contact_localization.accuracy.table``, one at a time, each into a temporary folder and with an
+``harness.experiment.subjects``, one at a time, each into a temporary folder and with an
 empty cache. Each finished object is appended as a line of JSON to ``--out``, and what stands there is not
 built again, so that a stopped run resumes. Two tables: seconds of the clock and of the processor by stage;
 and errors at held-out vertices beside both baselines and the float16 table at its own nodes, with a mean and

@@ -22,10 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.benchmark_runs import Case, Cell, cells, performed
-from experiments.contact_localization.answer import ESTIMATOR, PROGRAM, Models
+from experiments.contact_localization.answer import ESTIMATOR, PROGRAM
 from experiments.contact_localization.experiment import EXPERIMENT
-from experiments.contact_localization.settings import needs_sound
 from harness.basics.whole_file import write_text_whole
 from harness.bench.station_file import load_station, station_path
 from harness.cost.choice import for_budget
@@ -34,12 +32,15 @@ from harness.cost.file import curve_path, load, sample_json
 from harness.cost.provenance import code, machine, stale
 from harness.effects.accuracy import Level
 from harness.experiment.budget import ask
-from harness.experiment.costing import workers_of
+from harness.experiment.costing import measure_sample
 from harness.experiment.front import Front, front_of
-from harness.experiment.solving import Target
+from harness.experiment.in_process import RunCell
+from harness.experiment.measuring import measurement_of, perform_cells, workers_of
+from harness.experiment.solving import Solver, Target
 from harness.experiment.subjects import objects
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell as Entry
+from tests.support.localization import conditions
 
 SHARE = 0.95
 CONTACTS = 6
@@ -73,7 +74,8 @@ def main() -> None:
     names = given.only or list(objects(None))
     rows: list[list[Entry]] = []
     for spacing in given.spacing or ("close", "spread"):
-        wanted = cells(names, seeds, [spacing], ["default"], [given.yaw], given.sense == "both")
+        chosen = conditions(spacing, yaws=[given.yaw], sense=given.sense)
+        wanted = measurement_of(EXPERIMENT).cells(names, seeds, chosen)
         records = measured(wanted, curve, given.out, given.workers)
         if not records:
             say(f"{spacing}: no run could be performed")
@@ -87,7 +89,7 @@ def main() -> None:
     finish_figure("localization", "budget", f"{heads}; {more}", rows)
 
 
-def measured(wanted: Sequence[Cell], curve: Curve, folder: Path, workers: int) -> list[Record]:
+def measured(wanted: Sequence[RunCell], curve: Curve, folder: Path, workers: int) -> list[Record]:
     """A record of each run that can be performed, from the disk where it was made before."""
     reasons = stale(curve, machine(), code(ESTIMATOR))
     if reasons:
@@ -96,15 +98,18 @@ def measured(wanted: Sequence[Cell], curve: Curve, folder: Path, workers: int) -
     stamp = {"machine": machine(), "sha256": code(ESTIMATOR)["sha256"], "curve": curve.made}
     known = {cell: _kept(folder / f"{cell.name}.json", stamp) for cell in wanted}
     scenes, station = objects(None), load_station(station_path("mock"))
-    models: dict[str, Models] = {}
+    measured = measurement_of(EXPERIMENT)
     missing = [cell for cell, record in known.items() if record is None]
-    with workers_of(workers if missing else 1) as pool:
-        cases = performed(missing, scenes, station, pool, models, say)
-    for number, (cell, case) in enumerate(cases.items(), start=1):
-        record = {**stamp, **_record(case, _front(curve, cell, reasons))}
-        write_text_whole(folder / f"{cell.name}.json", json.dumps(record, allow_nan=False))
-        known[cell] = record
-        say(f"{cell.name}: run {number} of {len(cases)}")
+    with (
+        workers_of(workers if missing else 1) as pool,
+        perform_cells(PROGRAM, missing, scenes, station, pool, say) as runs,
+    ):
+        for number, (cell, files) in enumerate(runs.items(), start=1):
+            run = measured.solver(files, cell).first(CONTACTS)
+            record = {**stamp, **_record(cell, run, _front(curve, cell, run, reasons))}
+            write_text_whole(folder / f"{cell.name}.json", json.dumps(record, allow_nan=False))
+            known[cell] = record
+            say(f"{cell.name}: run {number} of {len(runs)}")
     return [record for record in known.values() if record is not None]
 
 
@@ -115,28 +120,26 @@ def _kept(path: Path, stamp: Mapping[str, Any]) -> Record | None:
     return record if all(record.get(name) == value for name, value in stamp.items()) else None
 
 
-def _front(curve: Curve, cell: Cell, reasons: Sequence[str]) -> Front:
+def _front(curve: Curve, cell: RunCell, run: Solver, reasons: Sequence[str]) -> Front:
+    conditions = cell.conditions
     wanted: dict[str, Level] = {
-        "spacing": cell.spacing,
-        "gap": cell.gap,
-        "yaw": cell.yaw,
+        **{name: conditions[name] for name in ("spacing", "gap", "yaw")},
         "contacts": CONTACTS,
     }
-    found = front_of(EXPERIMENT, curve, wanted, reasons, shipped=False)
-    return found if cell.sound else found.fitting(lambda setting: "unheard" if needs_sound(setting) else None)
+    return front_of(EXPERIMENT, curve, wanted, reasons, shipped=False).fitting(run.unfit)
 
 
-def _record(case: Case, front: Front) -> dict[str, Any]:
+def _record(cell: RunCell, run: Solver, front: Front) -> dict[str, Any]:
     """One run: as asked for each budget and error, and at every setting."""
-    tried = {point.name: sample_json(case.sample(point.levels, CONTACTS)) for point in front.points}
-    budgets = [_asked(case, front, Target(seconds=budget)) for budget in BUDGETS]
-    errors = [_asked(case, front, Target(error=error)) for error in ERRORS]
-    return {"object": case.run.object, "budgets": budgets, "errors": errors, "tried": tried}
+    tried = {point.name: sample_json(measure_sample(cell, run, point.levels)) for point in front.points}
+    budgets = [_asked(run, front, Target(seconds=budget)) for budget in BUDGETS]
+    errors = [_asked(run, front, Target(error=error)) for error in ERRORS]
+    return {"object": run.object, "budgets": budgets, "errors": errors, "tried": tried}
 
 
-def _asked(case: Case, front: Front, target: Target) -> dict[str, Any]:
-    refused = target.seconds is not None and not _foreseen(case, front, target.seconds)
-    found = ask(case.run, front, target)
+def _asked(run: Solver, front: Front, target: Target) -> dict[str, Any]:
+    refused = target.seconds is not None and not _foreseen(run, front, target.seconds)
+    found = ask(run, front, target)
     return {
         "asked": target.seconds if target.seconds is not None else target.error,
         "refused_before": refused,
@@ -145,12 +148,12 @@ def _asked(case: Case, front: Front, target: Target) -> dict[str, Any]:
         "kept": found.kept,
         "wall_s": found.seconds,
         "cpu_s": found.cpu,
-        "error_m": case.error_of(found.solved, CONTACTS),
+        "error_m": found.solved.error,
     }
 
 
-def _foreseen(case: Case, front: Front, seconds: float) -> bool:
-    return for_budget(front.points, seconds, case.run.object, front.scale).fits
+def _foreseen(run: Solver, front: Front, seconds: float) -> bool:
+    return for_budget(front.points, seconds, run.object, front.scale).fits
 
 
 @dataclass(frozen=True)

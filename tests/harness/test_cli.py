@@ -175,14 +175,17 @@ def test_what_nobody_foresaw_is_one_json_object_too(
 
 
 def test_what_is_not_built_is_wrong_use_in_its_own_words(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = ["tables", "contact-localization", "--recordings", str(tmp_path), "--out", str(tmp_path / "out")]
-    assert invoke([*words, "--only", "mug", "--seeds", "1", "--json"]) == 2
+    def unbuilt(*_: object, **__: object) -> None:
+        raise NotImplementedError("printed markers in the gel: no world has them")
+
+    monkeypatch.setattr("harness.cli._app", unbuilt)
+    assert invoke(["explain", "--json"]) == 2
     captured = capsys.readouterr()
     answer = json.loads(captured.out)
     assert answer["kind"] == WrongUse.kind()
-    assert answer["error"].startswith("tables contact-localization --recordings: ")
+    assert answer["error"].startswith("printed markers in the gel: ")
     assert "Traceback" not in captured.err
 
 

@@ -7,9 +7,8 @@ from typing import Any
 
 import pytest
 
-from experiments.contact_localization.accuracy.benchmark_runs import Case, cells
-from experiments.contact_localization.accuracy.budget import shipped_curve
 from experiments.contact_localization.answer import ESTIMATOR, PROGRAM
+from experiments.contact_localization.cells import ContactCell
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.posterior.estimate import METHOD, SPACING
 from experiments.contact_localization.settings import (
@@ -31,8 +30,10 @@ from harness.cost.provenance import code, machine
 from harness.effects.accuracy import Accuracy, Level
 from harness.experiment.begin import begin, require_reachable
 from harness.experiment.budget import answer_as_asked, sentences
-from harness.experiment.costing import Work, gathered, joined, measure
+from harness.experiment.costing import Asked, gathered, joined, measure
 from harness.experiment.front import Front, doubts, foresee, front_for, staleness
+from harness.experiment.in_process import RunCell
+from harness.experiment.measuring import measurement_of
 from harness.experiment.solving import Target, target_of
 from harness.experiment.subjects import object_key, objects
 from harness.objects.household import build
@@ -239,7 +240,9 @@ def test_without_a_curve_of_this_machine_the_one_that_came_along_is_gone_by_and_
 ) -> None:
     front = front_of_run(done)
     assert front.shipped
-    for point in shipped_curve().points:
+    shipped = measurement_of(EXPERIMENT).shipped_curve()
+    assert shipped is not None
+    for point in shipped.points:
         Accuracy.default(KNOBS).with_(point.levels)  # levels that today's dials have
     if not front.trusted:
         assert "touchstone cost" in staleness(EXPERIMENT, front)
@@ -322,31 +325,35 @@ def test_settings_hold_the_default_and_the_finest_and_each_once() -> None:
     assert all(setting in settings(True) for setting in settings(False))
 
 
-@pytest.fixture(scope="module")
-def two_settings() -> Work:
-    return Work(tuple(cells(["wrench"], [5], ["spread"], ["default"], ["known"])), (COARSE, DEFAULT), (2, 3))
-
-
-def test_fewer_contacts_are_measured_at_few_settings(two_settings: Work) -> None:
-    few = replace(two_settings, counts=(2, 4, 6), fewer=(DEFAULT,))
-    assert few.asked == ((2, DEFAULT), (4, DEFAULT), (6, COARSE), (6, DEFAULT))
-    assert few.each == 4
+def test_fewer_contacts_are_measured_at_few_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = "experiments.contact_localization.accuracy.measurement"
+    monkeypatch.setattr(f"{module}.settings", lambda *_asked: [COARSE, DEFAULT])
+    monkeypatch.setattr(f"{module}.settings_by_count", lambda _sound: [DEFAULT])
+    few = measurement_of(EXPERIMENT).asked(False, {"sense": ["touch"]}, objects(None), (2, 4, 6))
+    assert few == [(2, DEFAULT), (4, DEFAULT), (6, COARSE), (6, DEFAULT)]
 
 
 def test_a_measurement_performs_once_answers_everywhere_and_resumes(
-    two_settings: Work, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    station, scenes = load_station(station_path("mock")), objects(None)
-    ((_, points),) = measure(EXPERIMENT, two_settings, scenes, station, tmp_path, pytest.fail)
-    assert len(points) == two_settings.each == 4
+    asked: Asked = [(count, setting) for count in (2, 3) for setting in (COARSE, DEFAULT)]
+    wanted = [ContactCell("wrench", "default", 5, "spread")]
+
+    def measured() -> list[tuple[RunCell, list[Point]]]:
+        station = load_station(station_path("mock"))
+        own = measurement_of(EXPERIMENT)
+        return list(measure(own, wanted, asked, objects(None), station, tmp_path, pytest.fail))
+
+    ((_, points),) = measured()
+    assert len(points) == 4
     assert {int(point.condition["contacts"]) for point in points} == {2, 3}
     assert all(point.samples[0].cpu > 0.0 and point.samples[0].error < 0.5 for point in points)
 
-    def again(*_: object) -> Case:
+    def again(*_: object) -> None:
         raise AssertionError("the run was performed again")
 
-    monkeypatch.setattr("experiments.contact_localization.accuracy.benchmark_runs.perform", again)
-    ((_, resumed),) = measure(EXPERIMENT, two_settings, scenes, station, tmp_path, pytest.fail)
+    monkeypatch.setattr("harness.experiment.measuring.record_run", again)
+    ((_, resumed),) = measured()
     assert [point.samples for point in resumed] == [point.samples for point in points]
     (kept,) = tmp_path.glob("*.json")
     whole = kept.read_text(encoding="utf-8")
@@ -355,11 +362,11 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
         del point["sample"]["work"]
     kept.write_text(json.dumps({**tree, "schema": 1}), encoding="utf-8")
     with pytest.raises(AssertionError, match="performed again"):
-        list(measure(EXPERIMENT, two_settings, scenes, station, tmp_path, pytest.fail))
+        measured()
     kept.write_text(whole, encoding="utf-8")
     monkeypatch.setattr("harness.experiment.costing.code", lambda _: {"sha256": "other"})
     with pytest.raises(AssertionError, match="performed again"):
-        list(measure(EXPERIMENT, two_settings, scenes, station, tmp_path, pytest.fail))
+        measured()
     monkeypatch.undo()
     curve = gathered(EXPERIMENT, points, "T")
     assert len(joined(EXPERIMENT, curve, curve).points) == 4
@@ -370,7 +377,7 @@ def test_the_command_measures_keeps_and_draws(
     cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "experiments.contact_localization.accuracy.table.settings", lambda *_asked: [COARSE, DEFAULT]
+        "experiments.contact_localization.accuracy.measurement.settings", lambda *_asked: [COARSE, DEFAULT]
     )
     arguments = ["cost", "contact-localization", "--only", "wrench", "--seeds", "1", "--spacing", "spread"]
     arguments += ["--sense", "touch"]

@@ -19,8 +19,8 @@ import cv2
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.benchmark_runs import Cell, scene_of
 from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.cells import ContactCell
 from experiments.contact_localization.posterior.estimate import Estimate
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.geometry import inverse
@@ -173,4 +173,4 @@ def test_each_object_of_the_table(name: str, tmp_path: Path) -> None:
     scenes = objects(find_shared_data())
     if name not in scenes:
         pytest.skip(WHY_NOT)
-    compare(name, scene_of(Cell(name, "close", GAP, "known", SEED), scenes[name]), tmp_path)
+    compare(name, ContactCell(name, GAP, SEED, "close").create_scene(scenes[name]), tmp_path)

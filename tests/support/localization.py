@@ -34,6 +34,19 @@ def chosen(texts: list[str]) -> Accuracy:
     return chosen_levels(KNOBS, texts)
 
 
+def conditions(
+    *spacings: str, yaws: Sequence[str] = ("known",), sense: str = "touch"
+) -> dict[str, Sequence[str]]:
+    """Return the conditions of planned contacts with the default gap, as a measurement takes them."""
+    return {
+        "spacing": spacings,
+        "gap": ["default"],
+        "yaw": yaws,
+        "choose": ["planned"],
+        "sense": [sense],
+    }
+
+
 def answer(run: RunFiles, accuracy: Accuracy) -> Answer:
     """What a whole recording says."""
     found = score(EXPERIMENT, run, accuracy).found

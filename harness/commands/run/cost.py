@@ -60,9 +60,9 @@ def cost(
     from harness.bench.station_file import load_station, station_path
     from harness.cost.file import curve_path, load, save
     from harness.cost.provenance import code, machine, stale
-    from harness.experiment.costing import Work, gathered, joined, measure
+    from harness.experiment.costing import gathered, joined, measure
     from harness.experiment.lookup import named
-    from harness.experiment.tables import measurement_of
+    from harness.experiment.measuring import measurement_of
     from harness.report.cost_page import write_cost_page
 
     kind = named(context.info_name or "")
@@ -74,25 +74,18 @@ def cost(
     given = {"spacing": spacing, "yaw": yaw, "sense": None if sense is None else [sense]}
     chosen = {**levels_of(measured.conditions, given, where or []), "gap": [gap]}
     wanted = measured.cells(list(scenes), range(first_seed, first_seed + seeds), chosen)
-    work = Work(
-        tuple(wanted),
-        tuple(measured.settings(thorough, chosen, scenes)),
-        tuple(sorted(set(contacts or measured.counts))),
-        None if measured.fewer is None else tuple(measured.fewer(chosen)),
-    )
+    asked = measured.asked(thorough, chosen, scenes, sorted(set(contacts or measured.counts)))
     station = load_station(station_path("mock"))
     points: list[Any] = []
-    models: dict[str, Any] = {}
     with hold_folder(out), run_progress(len(wanted)) as advance:
         cells = out / "cells"
-        for _, found in measure(kind, work, scenes, station, cells, warn, own_cores(), models):
+        for _, found in measure(measured, wanted, asked, scenes, station, cells, warn, own_cores()):
             points += found
             advance()
     if not points:
         raise DataRefused("no run could be performed; the reasons stand above")
-    curve = gathered(
-        kind, points, f"What {kind.title[:1].lower()}{kind.title[1:]} costs", measured.notes(models)
-    )
+    title = f"What {kind.title[:1].lower()}{kind.title[1:]} costs"
+    curve = gathered(kind, points, title, measured.notes())
     path = curve_path(kind.name)
     make_folder(path.parent)
     with hold_briefly(path.with_suffix(".lock")):  # another measurement may join its points meanwhile

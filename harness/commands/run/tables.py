@@ -14,7 +14,7 @@ from harness.commands.run.conditions import WhereOption, levels_of
 
 if TYPE_CHECKING:
     from harness.basics.metrics import Interval
-    from harness.experiment.experiment import MeasuredColumn
+    from harness.experiment.measuring import MeasuredColumn
     from harness.experiment.tables import Key, TableRow
 
 
@@ -75,15 +75,16 @@ def tables(
     from harness.bench.gap import load_gap
     from harness.commands.scenes import with_assignments
     from harness.experiment.lookup import named
-    from harness.experiment.subjects import REAL, find_data_folder, objects
-    from harness.experiment.tables import by_object, key_of, measure, require_same_keys, rows, table_of
+    from harness.experiment.measuring import table_of
+    from harness.experiment.subjects import find_data_folder, objects
+    from harness.experiment.tables import by_object, key_of, measure, require_same_keys, rows
 
     kind = named(context.info_name or "")
     measured = table_of(kind)
     out = out or Path("runs/tables") / kind.name
     folder = data or find_data_folder()
-    scenes = objects(folder, more=measured.subjects)
-    absent = [name for name in (*REAL, *measured.subjects) if name not in scenes]
+    scenes = objects(folder, measured.subjects)
+    absent = [name for name in measured.subjects if name not in scenes]
     if absent:
         warn(f"left out, no mesh of it in {folder} (--data or TOUCHSTONE_DATA names it): {', '.join(absent)}")
     for name in only or []:
@@ -110,8 +111,8 @@ def tables(
     table = rows(kind, results)
     failed = sum("failed" in result for result in results.values())
     conditions = sorted({key_of(cell) for cell, result in results.items() if "rows" in result})
+    values = ["error_m", *(column.key for column in measured.columns if column.by_object)]
     if json:
-        values = dict.fromkeys(("error_m", *measured.per_object))
         objects_ = [
             {**dict(key), **{f"mean_{value}": by_object(results, key, value) for value in values}}
             for key in conditions
@@ -122,7 +123,7 @@ def tables(
         return 0
     print_table(table, measured.columns)
     for key in conditions:
-        for value in measured.per_object:
+        for value in values if measured.columns else ():
             print_by_object(key, value, by_object(results, key, value), [row.method for row in table])
     if measured.published:
         said = "; ".join(

@@ -12,13 +12,14 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
+from itertools import product
 from pathlib import Path
 from time import process_time
 
 import numpy as np
 from rich.console import Console
 
-from experiments.contact_localization.accuracy.benchmark_runs import cells, scene_of
+from experiments.contact_localization.cells import ContactCell
 from experiments.contact_localization.experiment import EXPERIMENT
 from harness.agreement.agreement import Sense, Verdict
 from harness.agreement.compare_run import agreement_of
@@ -27,7 +28,7 @@ from harness.basics.materials import material
 from harness.bench.scene import scene_from_options
 from harness.bench.scene_objectfile import shipped_objectfiles
 from harness.bench.station_file import Station, load_station, station_path
-from harness.experiment.in_process import recorded
+from harness.experiment.in_process import record_run
 from harness.objects.household import MATERIALS, build
 from harness.recording.run_folder import RunFiles
 from harness.sim.optics.tactile_calibration import TactileCalibration
@@ -154,19 +155,18 @@ def rows(
     seed: int, folder: Path, station: Station, known: Rows, cases: Sequence[str]
 ) -> Iterator[ComparedRun]:
     """Every run of a seed against every model of some cases."""
-    gaps = ["default", "moved_microphone"]
-    for every in cells(OBJECTS, [seed], ["spread"], gaps, ["known"], sound=True):
-        cell = replace(every, sound=every.object not in SILENT)
-        still = cell.gap == "default"
+    for gap, name in product(("default", "moved_microphone"), OBJECTS):
+        cell = ContactCell(name, gap, seed, "spread", sound=name not in SILENT)
+        still = gap == "default"
         if not (still or (cell.sound and MICROPHONE in cases)):
             continue
-        scene = scene_of(cell, scene_from_options(f"builtin:{cell.object}"))
-        run = RunFiles(recorded(EXPERIMENT, cell, scene, station, folder))
+        scene = cell.create_scene(scene_from_options(f"builtin:{name}"))
+        run = RunFiles(record_run(EXPERIMENT, cell, scene, station, folder))
         if not still:
             yield known.row(MICROPHONE, run, partial(own_subject, run))
             continue
         for case, subject_of in CASES.items():
-            if case in cases and not (case.startswith("turned") and cell.object in ROUND):
+            if case in cases and not (case.startswith("turned") and name in ROUND):
                 yield known.row(case, run, partial(subject_of, run, cell.seed))
 
 

@@ -6,22 +6,20 @@ The meshes are read from the folder that TOUCHSTONE_DATA names; `make data` lack
 """
 
 from collections import defaultdict
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 
 from experiments.scale_estimation.answer import KNOBS, ScaleAnswering
-from experiments.scale_estimation.cells import ScaleCell, scene_of
+from experiments.scale_estimation.cells import ScaleCell
 from experiments.scale_estimation.size import Belief
 from harness.basics.errors import FitRefused
 from harness.bench.scene import SceneFile, scene_from_json, scene_from_options
 from harness.bench.station_file import Station, load_station, station_path
 from harness.effects.accuracy import Accuracy
+from harness.experiment.in_process import open_run
 from harness.experiment.lookup import named
-from harness.experiment.plain import perform_in_process
 from harness.experiment.truth import read_truth
-from harness.recording.run_folder import RunFiles
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell
 from tests.support.real_data import find_shared_data
@@ -72,13 +70,13 @@ def answer_run(
         station: mocked bench.
         recordings: folder of the recordings; None to keep none.
     """
-    tree = scene_of(scene, cell).model_dump(mode="json", by_alias=True)
+    tree = cell.create_scene(scene).model_dump(mode="json", by_alias=True)
     tree["sensors"].update(sound=False)
     silent = scene_from_json(tree, cell.name)
     experiment = named("scale-estimation")
-    with closing(perform_in_process(experiment, cell, silent, station, recordings)) as case:
-        recording = case.run.files.recording
-        answering = ScaleAnswering(RunFiles(recording), Accuracy.default(KNOBS))
+    with open_run(experiment, cell, silent, station, recordings) as run:
+        recording = run.recording
+        answering = ScaleAnswering(run, Accuracy.default(KNOBS))
         for record in recording.steps():
             answering.read(record)
         truth = read_truth(recording)

@@ -4,24 +4,23 @@ Run as ``PYTHONPATH=. python tests/benchmarks/scale/bench_looks.py [--seeds 10] 
 [--gap unplaced]``; a second a look. The real meshes are fetched by `make data`, or named by TOUCHSTONE_DATA.
 """
 
-from contextlib import closing, suppress
+from contextlib import suppress
 
 import numpy as np
 
 from experiments.paper.scale_table import by_box
 from experiments.scale_estimation.answer import KNOBS, ScaleAnswering
-from experiments.scale_estimation.cells import ScaleCell, scene_of
+from experiments.scale_estimation.cells import ScaleCell
 from experiments.scale_estimation.size import Belief
 from harness.basics.errors import FitRefused
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import Station, load_station, station_path
 from harness.effects.accuracy import Accuracy
+from harness.experiment.in_process import open_run
 from harness.experiment.lookup import named
-from harness.experiment.plain import perform_in_process
 from harness.experiment.subjects import objects
 from harness.experiment.truth import read_truth
 from harness.picture.outline import SeenOutline
-from harness.recording.run_folder import RunFiles
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell
 from tests.support.real_data import find_shared_data
@@ -50,13 +49,13 @@ def main() -> None:
 
 def look(cell: ScaleCell, scene: SceneFile, station: Station) -> Row:
     """Perform one and answer it three ways."""
-    tree = scene_of(scene, cell).model_dump(mode="json", by_alias=True)
+    tree = cell.create_scene(scene).model_dump(mode="json", by_alias=True)
     tree["scale"]["contacts"] = 0
     tree["sensors"].update(sound=False, touch=False)
     looks = scene_from_json(tree, cell.name)
-    with closing(perform_in_process(named("scale-estimation"), cell, looks, station)) as case:
-        recording = case.run.files.recording
-        answering = ScaleAnswering(RunFiles(recording), Accuracy.default(KNOBS))
+    with open_run(named("scale-estimation"), cell, looks, station) as run:
+        recording = run.recording
+        answering = ScaleAnswering(run, Accuracy.default(KNOBS))
         for record in recording.steps():
             answering.read(record)
         truth = read_truth(recording)

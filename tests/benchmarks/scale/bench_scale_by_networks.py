@@ -9,24 +9,22 @@ holds; seconds.
 """
 
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
 from rich.console import Console
 
 from experiments.scale_estimation.answer import KNOBS, ScaleAnswering
-from experiments.scale_estimation.cells import ScaleCell, scene_of
+from experiments.scale_estimation.cells import ScaleCell
 from experiments.scale_estimation.size import Belief
 from harness.basics.errors import FitRefused
 from harness.bench.scene import SceneFile, scene_from_options
 from harness.bench.station_file import Station, load_station, station_path
 from harness.effects.sound import SHAPES
+from harness.experiment.in_process import open_run
 from harness.experiment.levels import chosen_levels
 from harness.experiment.lookup import named
-from harness.experiment.plain import perform_in_process
 from harness.experiment.truth import read_truth
-from harness.recording.run_folder import RunFiles
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell
 
@@ -46,14 +44,14 @@ class AnsweredSize:
 
 def answered(cell: ScaleCell, scene: SceneFile, station: Station) -> Iterator[AnsweredSize]:
     """A run at both levels."""
-    here = scene_of(scene, cell)
-    with closing(perform_in_process(named("scale-estimation"), cell, here, station)) as case:
-        recording = case.run.files.recording
+    here = cell.create_scene(scene)
+    with open_run(named("scale-estimation"), cell, here, station) as run:
+        recording = run.recording
         truth = read_truth(recording)
         assert truth is not None, "no instrument read anything in this run"
         size = float(truth.differences["longest_side_m"])
         for level in LEVELS:
-            answering = ScaleAnswering(RunFiles(recording), chosen_levels(KNOBS, (), {SHAPES.name: level}))
+            answering = ScaleAnswering(run, chosen_levels(KNOBS, (), {SHAPES.name: level}))
             for record in recording.steps():
                 answering.read(record)
             found = answering.answer()

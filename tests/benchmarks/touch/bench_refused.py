@@ -23,9 +23,11 @@ from rich.console import Console
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, perform, scene_of
+from experiments.contact_localization.accuracy.measurement import ContactMeasurement
+from experiments.contact_localization.accuracy.run import ContactRun, run_of
 from experiments.contact_localization.answer import Models, prepare, solve
 from experiments.contact_localization.build_model import model_of_scene
+from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.posterior.estimate import (
     BLOCK,
     METHOD,
@@ -36,16 +38,19 @@ from experiments.contact_localization.posterior.estimate import (
     Senses,
 )
 from experiments.contact_localization.posterior.policy import Readings
+from harness.basics.arrays import FloatArray
 from harness.basics.errors import TouchstoneError
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station, load_station, station_path
 from harness.effects.accuracy import Knob, Level, Setting
 from harness.effects.scene_object import known_object
 from harness.effects.sound import EDGE, MODES
+from harness.experiment.in_process import RunCell, open_run
 from harness.experiment.subjects import objects
 from harness.recording.run_folder import station_calibration
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell
+from tests.support.localization import conditions
 from tests.support.real_data import find_shared_data
 
 COUNTS = (1, 2, 6)
@@ -92,18 +97,24 @@ def settings(sense: Senses) -> Mapping[str, Setting]:
 
 
 def checked(
-    case: Case, model: str, models: Models, senses: Collection[Senses], levels: Collection[str]
+    cell: RunCell,
+    run: ContactRun,
+    model: str,
+    models: Models,
+    senses: Collection[Senses],
+    levels: Collection[str],
 ) -> Iterator[CheckedAnswer]:
     """A run's contacts, answered by an object's model at some levels, all where none is named."""
-    readings = case.run.read({})
+    readings = run.readings({})
     for sense in senses:
         for level, setting in settings(sense).items():
             if not levels or level in levels:
                 under = readings.under(models.at(setting))
                 prepare(under.model, setting)
-                for count, first in _groups(case.steps):
+                for count, first in _groups(len(run.observations)):
                     some = _group(under, count, first)
-                    yield _checked(case, model, sense, level, first, some, setting)
+                    true = run.truth[first + count - 1]
+                    yield _checked(cell, model, sense, level, first, some, setting, true)
 
 
 def _groups(contacts: int) -> Iterator[tuple[int, int]]:
@@ -123,15 +134,21 @@ def _group(readings: Readings, count: int, first: int) -> Readings:
 
 
 def _checked(
-    case: Case, model: str, sense: Senses, level: str, first: int, readings: Readings, setting: Setting
+    cell: RunCell,
+    model: str,
+    sense: Senses,
+    level: str,
+    first: int,
+    readings: Readings,
+    setting: Setting,
+    true: FloatArray,
 ) -> CheckedAnswer:
-    cell, count = case.cell, len(readings.observations)
-    solved, true = solve(readings, setting), case.true_points[first + count - 1]
+    count, solved = len(readings.observations), solve(readings, setting)
     found = solved.found
     return CheckedAnswer(
         object=cell.object,
         seed=cell.seed,
-        spacing=cell.spacing,
+        spacing=cell.conditions["spacing"],
         model=model,
         sense=sense,
         level=level,
@@ -163,18 +180,21 @@ def checked_runs(
     there = {(row.object, row.seed, row.spacing) for row in found}
     answering = dict(zip(names, names[1:] + names[:1] if choice.another else names, strict=True))
     models: dict[str, Models] = {}
-    for cell in cells(names, seeds, [choice.spacing], ["default"], ["known"], "both" in choice.senses):
-        if (cell.object, cell.seed, cell.spacing) in there:
+    measured = ContactMeasurement(EXPERIMENT)
+    chosen = conditions(choice.spacing, sense="both" if "both" in choice.senses else "touch")
+    for cell in measured.cells(names, seeds, chosen):
+        if (cell.object, cell.seed, cell.conditions["spacing"]) in there:
             continue
         model = answering[cell.object]
         if model not in models:
-            models[model] = _models(scene_of(replace(cell, object=model), scenes[model]), station)
+            models[model] = _models(replace(cell, object=model).create_scene(scenes[model]), station)
         try:
-            case = perform(cell, scenes[cell.object], station, {})
+            with open_run(EXPERIMENT, cell, cell.create_scene(scenes[cell.object]), station) as files:
+                run = run_of(files)
         except TouchstoneError as error:
             console.print(f"{cell.name} was not performed: {error}")
             continue
-        new = list(checked(case, model, models[model], choice.senses, choice.levels))
+        new = list(checked(cell, run, model, models[model], choice.senses, choice.levels))
         found += new
         _append(rows, new)
         console.print(f"{cell.name} answered")

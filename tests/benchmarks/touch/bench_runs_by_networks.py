@@ -17,16 +17,19 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, perform
-from experiments.contact_localization.answer import Models, prepare, solve
-from experiments.contact_localization.posterior.estimate import SENSES, needs_images
+from experiments.contact_localization.accuracy.measurement import ContactMeasurement
+from experiments.contact_localization.accuracy.run import ContactRun
+from experiments.contact_localization.experiment import EXPERIMENT
+from experiments.contact_localization.posterior.estimate import SENSES
 from harness.bench.scene import scene_from_options
 from harness.bench.station_file import load_station, station_path
 from harness.effects.accuracy import Level, Setting
 from harness.effects.sound import SHAPES as SOUND
 from harness.effects.touch import SHAPES as TOUCH
+from harness.experiment.in_process import RunCell, open_run
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell
+from tests.support.localization import conditions
 
 LEVELS: Mapping[str, Setting] = {
     "simulation": {TOUCH.name: "reference", SOUND.name: "elements"},
@@ -50,21 +53,20 @@ class AnsweredRun:
     seconds: float  #: of CPU, of readings and answer.
 
 
-def answered(case: Case) -> Iterator[AnsweredRun]:
+def answered(cell: RunCell, run: ContactRun) -> Iterator[AnsweredRun]:
     """A run at every choice of levels, by every sense."""
-    cell = case.cell
+    true, spacing = run.true, cell.conditions["spacing"]
+    assert true is not None
     for name, levels in LEVELS.items():
         for sense in SENSES.levels:
             setting: dict[str, Level] = {**levels, SENSES.name: sense}
-            readings = case.readings(setting)
-            prepare(readings.model, setting)
-            every = [solve(readings, setting) for _ in range(_REPEATS)]
-            found = every[0].found
-            inside = found is not None and bool(found.region.contains(case.true_points[-1]))
-            read = readings.shared[0] if needs_images(setting) else 0.0
+            read, _ = run.read(setting)
+            every = [run.solve(setting) for _ in range(_REPEATS)]
+            found, error = every[0].found, every[0].error
+            assert error is not None
+            inside = found is not None and bool(found.region.contains(true))
             seconds = read + min(each.cpu for each in every)
-            error = case.error_of(every[0], case.steps)
-            yield AnsweredRun(cell.object, cell.seed, cell.spacing, name, str(sense), error, inside, seconds)
+            yield AnsweredRun(cell.object, cell.seed, spacing, name, str(sense), error, inside, seconds)
 
 
 def answered_objects(named: Sequence[str], seeds: range, rows: Path | None) -> list[AnsweredRun]:
@@ -73,10 +75,11 @@ def answered_objects(named: Sequence[str], seeds: range, rows: Path | None) -> l
     found = [] if rows is None else rows_of(rows)
     there = {(row.object, row.seed, row.spacing) for row in found}
     for folder in named:
-        scene, models = scene_from_options(folder), dict[str, Models]()
-        for cell in cells([scene.object.name], seeds, SPACINGS, ["default"], ["known"], sound=True):
-            if (cell.object, cell.seed, cell.spacing) not in there:
-                new = list(answered(perform(cell, scene, station, models)))
+        scene, measured = scene_from_options(folder), ContactMeasurement(EXPERIMENT)
+        for cell in measured.cells([scene.object.name], seeds, conditions(*SPACINGS, sense="both")):
+            if (cell.object, cell.seed, cell.conditions["spacing"]) not in there:
+                with open_run(EXPERIMENT, cell, cell.create_scene(scene), station) as files:
+                    new = list(answered(cell, measured.solver(files, cell)))
                 found += new
                 _append(rows, new)
                 console.print(f"{cell.name} answered")

@@ -17,8 +17,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, performed
-from experiments.contact_localization.answer import Models
+from experiments.contact_localization.accuracy.measurement import ContactMeasurement
+from experiments.contact_localization.accuracy.run import ContactRun
+from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.posterior.baselines import without_images
 from experiments.contact_localization.posterior.estimate import SPACING, Senses
 from harness.basics.arrays import FloatArray
@@ -26,10 +27,11 @@ from harness.basics.geometry import rotation_about
 from harness.basics.symmetry import find_symmetries
 from harness.bench.gap import load_gap
 from harness.bench.station_file import load_station, station_path
-from harness.experiment.costing import workers_of
+from harness.experiment.in_process import RunCell
+from harness.experiment.measuring import perform_cells, workers_of
 from harness.experiment.subjects import objects
 from mocks.world.gap_draw import GapDraw
-from tests.support.localization import dials, estimate
+from tests.support.localization import conditions, dials, estimate
 
 TOLD: Mapping[str, frozenset[str]] = {
     "nothing": frozenset(),
@@ -55,16 +57,20 @@ def main() -> None:
     parser.add_argument("--data", type=Path, help="folder of the real meshes; built-in objects alone without")
     parser.add_argument("--workers", type=int, default=2)
     given = parser.parse_args()
-    scenes, models = objects(given.data), dict[str, Models]()
+    scenes, measured = objects(given.data), ContactMeasurement(EXPERIMENT)
     seeds = range(given.first_seed, given.first_seed + given.seeds)
-    wanted = cells(list(scenes), seeds, [given.spacing], ["default"], ["known"], True)
-    station = load_station(station_path("mock"))
-    with workers_of(given.workers) as pool:
-        cases = performed(wanted, scenes, station, pool, models, _say)
+    chosen = conditions(given.spacing, sense="both")
+    wanted, station = measured.cells(list(scenes), seeds, chosen), load_station(station_path("mock"))
+    with (
+        workers_of(given.workers) as pool,
+        perform_cells(EXPERIMENT.name, wanted, scenes, station, pool, _say) as runs,
+    ):
+        scored = [
+            _scored(cell, measured.solver(files, cell), SENSES[given.senses]) for cell, files in runs.items()
+        ]
     table = Table(
-        "told", "mm", "modulo symmetry", title=f"{len(cases)} runs, {given.spacing}, {given.senses}"
+        "told", "mm", "modulo symmetry", title=f"{len(scored)} runs, {given.spacing}, {given.senses}"
     )
-    scored = [_scored(case, SENSES[given.senses]) for case in cases.values()]
     for name in scored[0]:
         row = np.mean([errors[name] for errors in scored], axis=0)
         table.add_row(name, *(f"{1e3 * error:.2f}" for error in row))
@@ -75,10 +81,11 @@ def _say(line: str) -> None:
     sys.stderr.write(line + "\n")
 
 
-def _scored(case: Case, senses: Senses) -> dict[str, tuple[float, float]]:
+def _scored(cell: RunCell, run: ContactRun, senses: Senses) -> dict[str, tuple[float, float]]:
     """Metres, and metres modulo symmetry, by what is told; then what geometry alone makes of the poses."""
-    model, draw = case.run.models.at({}), GapDraw(load_gap(case.cell.gap), case.cell.seed)
-    symmetry, true = find_symmetries(case.mesh), case.true_points[-1]
+    model, draw = run.models.at({}), GapDraw(load_gap(cell.gap), cell.seed)
+    symmetry, true = find_symmetries(model.mesh), run.true
+    assert true is not None
 
     def off(point: FloatArray) -> tuple[float, float]:
         return float(np.linalg.norm(point - true)), float(symmetry.distance(point, true))
@@ -87,12 +94,12 @@ def _scored(case: Case, senses: Senses) -> dict[str, tuple[float, float]]:
     for name, what in TOLD.items():
         observations = [
             replace(one, base_from_gel=_corrected(one.base_from_gel, draw, k, what))
-            for k, one in enumerate(case.run.observations)
+            for k, one in enumerate(run.observations)
         ]
-        answer = estimate(observations, model, case.run.prior, levels, seed=case.cell.seed)
+        answer = estimate(observations, model, run.prior, levels, seed=cell.seed)
         found[name] = off(answer.position_in_object)
-    poses = [one.base_from_gel for one in case.run.observations]
-    alone = without_images(poses, model, case.run.prior, levels.of(SPACING), use_axis=True)
+    poses = [one.base_from_gel for one in run.observations]
+    alone = without_images(poses, model, run.prior, levels.of(SPACING), use_axis=True)
     return {**found, "geometry + axis, told nothing": off(alone)}
 
 

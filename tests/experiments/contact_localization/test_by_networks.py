@@ -8,8 +8,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.benchmark_runs import Cell
 from experiments.contact_localization.answer import Answer, ContactAnswering
+from experiments.contact_localization.cells import ContactCell
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.section import Localization
 from harness.basics.errors import DataRefused
@@ -18,7 +18,7 @@ from harness.bench.station_file import load_station, station_path
 from harness.effects.accuracy import Accuracy
 from harness.experiment.compare import compare
 from harness.experiment.experiment import Scored
-from harness.experiment.in_process import performed
+from harness.experiment.in_process import perform_run
 from harness.experiment.levels import chosen_levels
 from harness.objectfile.file import ObjectFile
 from harness.recording.run_folder import RunFiles
@@ -39,8 +39,8 @@ def run(of: ObjectFile, tmp_path_factory: pytest.TempPathFactory) -> RunFiles:
     """Three presses of it."""
     scene = scene_from_options(str(of.folder)).with_section(Localization(contacts=3, spacing="spread"))
     folder = tmp_path_factory.mktemp("runs") / "run"
-    cell = Cell("ball", "spread", "default", "known", 5)
-    return RunFiles(performed(EXPERIMENT, cell, scene, STATION, folder))
+    cell = ContactCell("ball", "default", 5, "spread")
+    return RunFiles(perform_run(EXPERIMENT, cell, scene, STATION, folder))
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.benchmark_runs import Cell
 from experiments.contact_localization.answer import ContactAnswering
+from experiments.contact_localization.cells import ContactCell
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.section import Localization
 from harness.basics.errors import WrongUse
@@ -17,7 +17,7 @@ from harness.effects.scene_object import known_object
 from harness.experiment.begin import begin
 from harness.experiment.compare import compare
 from harness.experiment.experiment import Scored
-from harness.experiment.in_process import performed
+from harness.experiment.in_process import perform_run
 from harness.experiment.levels import chosen_levels
 from harness.experiment.object_modes import object_modes
 from harness.recording.run_folder import RunFiles
@@ -39,8 +39,8 @@ def scene_with(colour: tuple[float, float, float] = (0.8, 0.8, 0.8)) -> SceneFil
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> RunFiles:
     folder = tmp_path_factory.mktemp("runs") / "run"
-    cell = Cell("wrench", "spread", "default", "known", 3)
-    return RunFiles(performed(EXPERIMENT, cell, scene_with(), STATION, folder))
+    cell = ContactCell("wrench", "default", 3, "spread")
+    return RunFiles(perform_run(EXPERIMENT, cell, scene_with(), STATION, folder))
 
 
 @pytest.fixture

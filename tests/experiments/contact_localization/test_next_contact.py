@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization import next_contact
-from experiments.contact_localization.accuracy.benchmark_runs import Cell
+from experiments.contact_localization.cells import ContactCell
 from experiments.contact_localization.experiment import EXPERIMENT, PLAN_KEY
 from experiments.contact_localization.next_contact import EXPECTED, PLACEHOLDER
 from experiments.contact_localization.section import Localization
@@ -17,7 +17,7 @@ from harness.bench.scene import SceneFile, Sensors, scene_from_options
 from harness.bench.station_file import load_station, station_path
 from harness.experiment.begin import begin
 from harness.experiment.experiment import Helpers
-from harness.experiment.in_process import performed
+from harness.experiment.in_process import perform_run
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import Step
@@ -27,7 +27,7 @@ from harness.skills.sites import Site
 from harness.twin.bench_of import twin_of
 
 STATION = load_station(station_path("mock"))
-CELL = Cell("mug", "close", "default", "known", 71, choose="active")
+CELL = ContactCell("mug", "default", 71, "close", choose="active")
 CONTACTS = 4
 
 
@@ -40,7 +40,7 @@ def scene(**asked: object) -> SceneFile:
 def run(tmp_path_factory: pytest.TempPathFactory) -> RunFiles:
     """Read only."""
     folder = tmp_path_factory.mktemp("runs") / "run"
-    return RunFiles(performed(EXPERIMENT, CELL, scene(), STATION, folder))
+    return RunFiles(perform_run(EXPERIMENT, CELL, scene(), STATION, folder))
 
 
 def chosen(run: RunFiles, said: list[str]) -> Iterator[Step]:
@@ -155,7 +155,7 @@ def test_a_place_whose_rehearsal_is_refused_is_passed_over(
 def test_each_place_is_struck_where_the_scene_is_heard(tmp_path: Path) -> None:
     heard = scene().with_section(Localization(contacts=2, choose="active"))
     heard = heard.model_copy(update={"sensors": Sensors(touch=True, sound=True)})
-    recording = performed(EXPERIMENT, CELL, heard, STATION, tmp_path / "run")
+    recording = perform_run(EXPERIMENT, CELL, heard, STATION, tmp_path / "run")
     assert [("strike" in record.step.parameters) for record in recording.steps()] == [True, True]
     assert all("microphone.pressure" in record.readings for record in recording.steps())
 

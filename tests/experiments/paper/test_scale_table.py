@@ -15,14 +15,14 @@ from experiments.paper.scale_table import (
     by_first_peak,
     constant,
     random_error,
-    run_cell,
 )
 from experiments.scale_estimation.answer import STARTS
-from experiments.scale_estimation.cells import ScaleCell, scene_of
-from experiments.scale_estimation.experiment import MEASUREMENT
+from experiments.scale_estimation.cells import ScaleCell
+from experiments.scale_estimation.experiment import EXPERIMENT
 from experiments.scale_estimation.size import SizeRange
 from harness.bench.scene import scene_from_json
 from harness.bench.station_file import Station
+from harness.experiment.measuring import measurement_of, table_of
 from tests.experiments.paper.test_scale_networks import write_means
 from tests.experiments.scale_estimation.test_sound import NOMINAL, model, peaks_at
 from tests.experiments.scale_estimation.test_vision import nominal, outline_at, view_of
@@ -65,7 +65,7 @@ def test_a_cell_is_answered_by_every_method_and_a_refusal_claims_no_more_than_th
     asked = {"contacts": 3, "strikes": 1, "paper_networks": str(tmp_path)}
     tree = {"schema": 1, "object": {"mesh": "builtin:mug"}, "scale": asked}
     cell = ScaleCell("mug", "unplaced", 3, "yes")
-    result = run_cell(cell, scene_from_json(tree, "the test"), station)
+    result = table_of(EXPERIMENT).run_cell(cell, scene_from_json(tree, "the test"), station)
     rows, true = result["rows"], result["size_m"]
     assert result["steps"] == 4
     assert set(rows) <= set(METHODS)
@@ -84,8 +84,8 @@ def test_a_cell_is_answered_by_every_method_and_a_refusal_claims_no_more_than_th
 def test_networks_that_answer_a_run_are_no_part_of_it() -> None:
     cell = ScaleCell("mug", "unplaced", 3, "yes")
     tree = {"schema": 1, "object": {"mesh": "builtin:mug"}}
-    plain = scene_of(scene_from_json(tree, "the test"), cell)
-    named = scene_of(scene_from_json({**tree, "scale": {"paper_networks": "somewhere"}}, "the test"), cell)
+    plain = cell.create_scene(scene_from_json(tree, "the test"))
+    named = cell.create_scene(scene_from_json({**tree, "scale": {"paper_networks": "somewhere"}}, "the test"))
     assert plain == named
 
 
@@ -96,5 +96,5 @@ def test_networks_that_answer_a_run_are_no_part_of_it() -> None:
 def test_a_cost_curve_turns_the_dial_that_the_answer_depends_on(
     shapes: list[str], levels: Sequence[int]
 ) -> None:
-    settings = MEASUREMENT.settings(False, {"shape": shapes}, {})
-    assert {setting[STARTS.name] for setting in settings} == set(levels)
+    asked = measurement_of(EXPERIMENT).asked(False, {"shape": shapes}, {}, (4,))
+    assert {setting[STARTS.name] for _, setting in asked} == set(levels)

@@ -10,19 +10,20 @@ import trimesh
 from experiments.paper import shape_table
 from experiments.paper.shape_table import (
     AVERAGE,
+    COLUMNS,
     FLOOR,
     ROW_NAMES,
-    TABLE,
     ShapeRow,
     points_error,
     rows_after,
     scored_rows,
 )
-from experiments.shape_reconstruction.cells import PRESSES, ShapeCell, scene_of
+from experiments.shape_reconstruction.cells import PRESSES, ShapeCell
 from experiments.shape_reconstruction.experiment import EXPERIMENT, NAME
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.bench.scene import scene_from_options
 from harness.commands.scenes import with_assignments
+from harness.experiment.measuring import table_of
 from harness.objects.builtin import build
 from tests.experiments.shape_reconstruction.touched import evidence_of, look_at, presses
 
@@ -109,17 +110,16 @@ def test_a_refused_answer_counts_as_far_off_as_the_object_is_large(monkeypatch: 
 
 def test_the_columns_of_the_table_are_keys_of_its_rows(quick: dict[str, dict[str, Any]]) -> None:
     rbf = quick["rbf, TV4"]
-    assert {column.key for column in TABLE.columns} <= set(rbf)
-    assert set(TABLE.per_object) <= set(rbf)
+    assert {"error_m", *(column.key for column in COLUMNS)} <= set(rbf)
 
 
 @pytest.mark.parametrize("choose", ["random", "active"])
 def test_a_cell_makes_as_many_presses_as_its_table_says(choose: str) -> None:
     cell = ShapeCell("mug", "default", 3, choose)
     scene = scene_from_options("builtin:mug")
-    assert scene_of(scene, cell).section(ShapeRun).presses == PRESSES[-1]
+    assert cell.create_scene(scene).section(ShapeRun).presses == PRESSES[-1]
     few = with_assignments({"mug": scene}, ShapeRun, ["presses=6", "library=somewhere"])["mug"]
-    stated = scene_of(few, cell).section(ShapeRun)
+    stated = cell.create_scene(few).section(ShapeRun)
     assert (stated.presses, stated.choose, stated.library) == (6, choose, None)
-    assert TABLE.cells(["mug"], [3], {"gap": ["default"], "choose": [choose]}) == [cell]
+    assert table_of(EXPERIMENT).cells(["mug"], [3], {"gap": ["default"], "choose": [choose]}) == [cell]
     assert EXPERIMENT.name == NAME == "shape-reconstruction"

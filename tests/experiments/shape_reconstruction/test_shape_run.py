@@ -22,6 +22,7 @@ from harness.bench.station_file import Station
 from harness.effects.accuracy import current_levels
 from harness.experiment.answer import finish
 from harness.experiment.begin import begin
+from harness.experiment.measuring import measurement_of
 from harness.experiment.truth import read_true_surface
 from harness.objects.builtin import build
 from harness.recording.recording import Recording
@@ -294,7 +295,7 @@ def test_a_removed_method_is_refused_and_a_stored_one_is_replaced(level: str) ->
     with pytest.raises(WrongUse, match=f"'{level}'.* {REMOVED[level]}"):
         METHOD.checked(level)
     assert current_levels([METHOD], {METHOD.name: level}) == {METHOD.name: REMOVED[level]}
-    assert EXPERIMENT.budgets is not None
+    measured = measurement_of(EXPERIMENT)
     scene = scene_from_json({"schema": 1, "object": {"mesh": "builtin:mug"}}, "mug")
-    assert "touchstone cost" in str(EXPERIMENT.budgets.unfit(scene, {METHOD.name: level}))
-    assert EXPERIMENT.budgets.unfit(scene, {METHOD.name: QUICK}) is None
+    assert "touchstone cost" in str(measured.unfit(scene, {METHOD.name: level}))
+    assert measured.unfit(scene, {METHOD.name: QUICK}) is None

@@ -18,7 +18,6 @@ from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
 from harness.effects.quantities import Quantities
 from harness.experiment.experiment import Experiment, Helpers, Planned, Scored
-from harness.experiment.plain import plain_budgets, plain_measurement
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 from harness.skills.planning import ContactRequest, plan_run
@@ -115,6 +114,5 @@ EXPERIMENT = Experiment(
     lines=lines,
     sources=sources,
     gives=("contact.gel_from_object",),
-    budgets=plain_budgets("toy", lambda scene: scene.section(Toy).presses, STRIDE),
-    measurement=plain_measurement("toy", STRIDE),
+    count_steps=lambda scene: scene.section(Toy).presses,
 )

@@ -15,10 +15,10 @@ from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import curve_path, save
 from harness.cost.provenance import code, machine
 from harness.effects.scene_object import known_object
+from harness.experiment.in_process import RunCell, open_run
 from harness.experiment.lookup import named
-from harness.experiment.plain import PlainCell, perform_in_process
+from harness.experiment.measuring import measurement_of
 from harness.experiment.subjects import object_key
-from harness.experiment.tables import measurement_of
 from harness.experiment.truth import read_true_surface
 from harness.recording.recording import Recording
 from tests.experiments.toy.experiment import CLAIMED, STRIDE
@@ -71,7 +71,11 @@ def test_it_is_run_resumed_replayed_and_reported(
 
 
 @pytest.mark.slow  # tables and curves of the others are tested by themselves
-def test_it_has_a_table_and_a_cost_curve(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_has_a_table_and_a_cost_curve(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The row of the toy is in this process alone.
+    monkeypatch.setattr("harness.commands.run.cost.own_cores", lambda: 1)
     one = ["--only", "mug", "--seeds", "1", "--gap", "none"]
     table = said(capsys, "tables", "toy", *one, "--workers", "1", "--out", str(tmp_path / "table"))
     assert [row["method"] for row in table["rows"]] == ["default", "toy.stride = 8"]
@@ -97,12 +101,14 @@ def test_its_table_reproduces_from_its_recordings(tmp_path: Path, capsys: pytest
 
 
 def test_recordings_of_another_scene_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    cell, station = PlainCell("mug", "none", 3), load_station(station_path("mock"))
+    cell, station = RunCell("mug", "none", 3), load_station(station_path("mock"))
     scene = scene_from_options("builtin:mug")
-    perform_in_process(named("toy"), cell, scene, station, tmp_path).close()
+    with open_run(named("toy"), cell, scene, station, tmp_path):
+        pass
     bowl = scene_from_options("builtin:bowl")
-    with pytest.raises(WrongUse, match="differs in object"):
-        perform_in_process(named("toy"), cell, bowl, station, tmp_path)
+    refused = pytest.raises(WrongUse, match="differs in object")
+    with refused, open_run(named("toy"), cell, bowl, station, tmp_path):
+        pass
 
 
 def without_seconds(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

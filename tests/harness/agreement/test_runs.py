@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.benchmark_runs import Cell
+from experiments.contact_localization.cells import ContactCell
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.section import Localization
 from harness.agreement.compare_run import agreement_of
@@ -20,7 +20,7 @@ from harness.bench.scene import scene_from_options
 from harness.bench.scene_objectfile import shipped_objectfiles
 from harness.bench.station_file import load_station, station_path
 from harness.effects.evaluate import Evaluation, evaluate
-from harness.experiment.in_process import performed
+from harness.experiment.in_process import perform_run
 from harness.objectfile.touch_entries import MAP_RANGE
 from harness.objects.builtin import build
 from harness.recording.recording import Recording
@@ -41,8 +41,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     )
     unheard = scene.sensors.model_copy(update={"sound": False})
     folder = tmp_path_factory.mktemp("runs") / "run"
-    cell = Cell("mug", "spread", "default", "known", SEED)
-    return performed(EXPERIMENT, cell, scene.model_copy(update={"sensors": unheard}), STATION, folder)
+    cell = ContactCell("mug", "default", SEED, "spread")
+    return perform_run(EXPERIMENT, cell, scene.model_copy(update={"sensors": unheard}), STATION, folder)
 
 
 @pytest.fixture

@@ -9,11 +9,11 @@ import pytest
 from harness.basics.errors import WrongUse
 from harness.bench.scene import scene_from_options
 from harness.commands.scenes import with_assignments
-from harness.experiment.experiment import MeasuredColumn
+from harness.experiment.in_process import RunCell
 from harness.experiment.lookup import named
-from harness.experiment.plain import PlainCell
+from harness.experiment.measuring import MeasuredColumn, Measurement
 from harness.experiment.subjects import REAL, objects
-from harness.experiment.tables import by_object, measurement_of, require_same_keys, rows
+from harness.experiment.tables import by_object, require_same_keys, rows
 
 
 def test_a_folder_goes_on_with_the_keys_it_began_with(tmp_path: Path) -> None:
@@ -47,24 +47,24 @@ def test_every_scene_has_the_keys_that_are_set() -> None:
         with_assignments(scenes, None, ["contacts=4"])
 
 
-MEASURED = replace(
-    measurement_of(named("scale-estimation")),
-    methods=("a", "b"),
-    columns=(MeasuredColumn("f", "F", "%"), MeasuredColumn("far_m", "far", "mm")),
-)
-RESULTS: dict[PlainCell, dict[str, Any]] = {
-    PlainCell("mug", "none", 0): {"rows": {"a": {"error_m": 1.0, "seconds": 1.0, "f": True}}},
-    PlainCell("mug", "none", 1): {
+class TwoMethods(Measurement):
+    methods = ("a", "b")
+    columns = (MeasuredColumn("f", "F", "%"), MeasuredColumn("far_m", "far", "mm"))
+
+
+RESULTS: dict[RunCell, dict[str, Any]] = {
+    RunCell("mug", "none", 0): {"rows": {"a": {"error_m": 1.0, "seconds": 1.0, "f": True}}},
+    RunCell("mug", "none", 1): {
         "rows": {"a": {"error_m": 3.0, "seconds": 1.0, "f": False}, "b": {"error_m": 5.0, "seconds": 1.0}}
     },
-    PlainCell("bowl", "none", 0): {"rows": {"a": {"error_m": 7.0, "seconds": 1.0}}},
-    PlainCell("bowl", "none", 1): {"failed": "WrongUse: no way"},
+    RunCell("bowl", "none", 0): {"rows": {"a": {"error_m": 7.0, "seconds": 1.0}}},
+    RunCell("bowl", "none", 1): {"failed": "WrongUse: no way"},
 }
 
 
 def test_further_columns_are_means_of_the_rows_that_have_them() -> None:
     # By another name, since the registry's own table of scale estimation would be taken instead.
-    experiment = replace(named("scale-estimation"), name="two methods", measurement=MEASURED)
+    experiment = replace(named("scale-estimation"), name="two methods", measurement=TwoMethods)
     by_method = {row.method: row for row in rows(experiment, RESULTS)}
     assert by_method["a"].means == {"f": 0.5}
     assert by_method["b"].means == {}
@@ -81,8 +81,8 @@ def test_an_experiment_may_have_real_objects_of_its_own(tmp_path: Path) -> None:
     for file, _, _ in REAL.values():
         (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / file).write_text("")
-    more = {"ball": ("ball.stl", "m", "plastic")}
-    assert set(objects(tmp_path, more=more)) == {*objects(tmp_path), "ball"}
-    assert "ball" not in objects(None, more=more)
+    more = {**REAL, "ball": ("ball.stl", "m", "plastic")}
+    assert set(objects(tmp_path, more)) == {*objects(tmp_path), "ball"}
+    assert "ball" not in objects(None, more)
     (tmp_path / "ball.stl").unlink()
-    assert objects(tmp_path, more=more) == objects(tmp_path)
+    assert objects(tmp_path, more) == objects(tmp_path)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.budget import Run
+from experiments.contact_localization.accuracy.run import ContactRun
 from experiments.contact_localization.answer import Models, solve
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.estimate import SENSES, SPACING, needs_images
@@ -64,9 +64,9 @@ def observations() -> tuple[Observation, ...]:
 
 
 @pytest.fixture
-def run(observations: tuple[Observation, ...]) -> Run:
+def run(observations: tuple[Observation, ...]) -> ContactRun:
     reader = GelReader(MODEL.calibration)
-    return Run(observations, reader, Models(lambda _: MODEL), Prior(np.eye(3)), 0, "plate")
+    return ContactRun(observations, reader, Models(lambda _: MODEL), Prior(np.eye(3)), 0, "plate", {})
 
 
 def front(audio_seconds: float, touch_seconds: float, audio_error: float = 2e-3) -> Front:
@@ -83,7 +83,9 @@ def front(audio_seconds: float, touch_seconds: float, audio_error: float = 2e-3)
     return Front(points, 1.0, K, (), "", shipped=False)
 
 
-def test_a_budget_that_only_sound_keeps_reads_no_image(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_budget_that_only_sound_keeps_reads_no_image(
+    run: ContactRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(GelReader, "read", never)
     found = ask(run, front(0.01, 1e4), Target(seconds=60.0))
     assert found.point.levels == AUDIO
@@ -91,7 +93,9 @@ def test_a_budget_that_only_sound_keeps_reads_no_image(run: Run, monkeypatch: py
     assert found.solved.found is not None
 
 
-def test_an_error_that_sound_promises_first_reads_no_image(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_that_sound_promises_first_reads_no_image(
+    run: ContactRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(GelReader, "read", never)
     found = ask(run, front(0.01, 1e4), Target(error=5e-3))
     assert found.tried == (setting_name(AUDIO),)
@@ -99,14 +103,14 @@ def test_an_error_that_sound_promises_first_reads_no_image(run: Run, monkeypatch
     assert found.promise == 2e-3
 
 
-def test_where_sound_promises_too_little_touch_is_tried_and_reads_the_images(run: Run) -> None:
+def test_where_sound_promises_too_little_touch_is_tried_and_reads_the_images(run: ContactRun) -> None:
     found = ask(run, front(0.01, 1.0, audio_error=9e-3), Target(error=5e-3))
     assert found.tried == (setting_name(TOUCH),)
     assert not found.kept  # blank images are refused, and a refusal promises nothing
     assert found.solved.refusal is not None
 
 
-def test_settings_that_need_sound_are_left_out_where_nothing_was_heard(run: Run) -> None:
+def test_settings_that_need_sound_are_left_out_where_nothing_was_heard(run: ContactRun) -> None:
     unheard = replace(run, observations=tuple(replace(one, strike=None) for one in run.observations))
     both = front(0.01, 1.0)
     assert [point.levels for point in both.fitting(unheard.unfit).points] == [TOUCH]
@@ -115,8 +119,8 @@ def test_settings_that_need_sound_are_left_out_where_nothing_was_heard(run: Run)
         replace(both, points=both.points[1:]).fitting(unheard.unfit)
 
 
-def test_sound_is_answered_the_same_whether_images_were_read_or_not(run: Run) -> None:
-    without = solve(run.read(AUDIO), AUDIO)
+def test_sound_is_answered_the_same_whether_images_were_read_or_not(run: ContactRun) -> None:
+    without = run.solve(AUDIO)
     with_images = solve(read(run.observations, run.reader, MODEL, run.prior, 0), AUDIO)
     assert with_images.found is not None
     assert without.found is not None

@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.contact_localization.accuracy.budget import shipped_curve
+from experiments.contact_localization.accuracy.measurement import ContactMeasurement
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.posterior.estimate import (
     BLOCK,
@@ -85,7 +85,7 @@ def test_about_thirty_settings_are_measured_over_senses_modes_and_elements() -> 
 
 def test_a_shipped_budget_never_buys_coarser_elements() -> None:
     """They are found sooner, once an object, and save an answer nothing: only luck would choose them."""
-    curve = shipped_curve()
+    curve = ContactMeasurement(EXPERIMENT).shipped_curve()
     coarse = [setting for setting in (point.levels for point in curve.points) if EDGE.name in setting]
     measured = [setting for setting in coarse if setting[EDGE.name] != EDGE.default]
     assert measured, "the curve no longer says what coarser elements cost"

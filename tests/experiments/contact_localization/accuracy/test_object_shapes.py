@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.benchmark_runs import preparations
-from experiments.contact_localization.accuracy.budget import BUDGETS
+from experiments.contact_localization.accuracy.measurement import ContactMeasurement
 from experiments.contact_localization.answer import Models
 from experiments.contact_localization.build_model import model_of_run, model_of_scene
+from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model
 from experiments.contact_localization.posterior.estimate import SENSES
 from experiments.contact_localization.settings import KNOBS, settings
@@ -145,7 +145,7 @@ def test_a_budget_chooses_no_objectfile_where_the_scene_names_none() -> None:
         for name, levels in named.items()
     ]
     front = Front(tuple(points), 1.0, 6, (), "today", shipped=False)
-    unfit = partial(BUDGETS.unfit, scene_of(None))
+    unfit = partial(ContactMeasurement(EXPERIMENT).unfit, scene_of(None))
     assert [point.name for point in front.fitting(unfit).points] == ["solved"]
     with pytest.raises(WrongUse, match=r"ObjectFiles.*touchstone cost contact-localization"):
         replace(front, points=(points[1],)).fitting(unfit)
@@ -162,7 +162,8 @@ def test_what_the_modes_took_is_said_by_level(of: ObjectFile) -> None:
     def make(accuracy: Accuracy) -> Model:
         return model_of_scene(scene_of(of), STATION, MUG, CALIBRATION, accuracy)
 
-    models = Models(make)
-    models.at({SENSES.name: "both", **LOWEST})
-    (said,) = preparations({"mug": models})
+    measured = ContactMeasurement(EXPERIMENT)
+    measured.models["mug"] = Models(make)
+    measured.models["mug"].at({SENSES.name: "both", **LOWEST})
+    (said,) = measured.notes()
     assert "sound.modes 16, sound.edge 0.35, sound.shapes network" in said

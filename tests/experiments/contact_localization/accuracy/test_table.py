@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy import table
-from experiments.contact_localization.accuracy.benchmark_runs import Cell, cells, scene_of
-from experiments.contact_localization.accuracy.table import MEASUREMENT, METHODS
+from experiments.contact_localization.accuracy import measurement
+from experiments.contact_localization.accuracy.measurement import METHODS
+from experiments.contact_localization.cells import ContactCell
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.baselines import mean_random_error
@@ -19,13 +19,17 @@ from experiments.contact_localization.posterior.policy import read
 from harness.basics.errors import WrongUse
 from harness.basics.symmetry import find_symmetries
 from harness.bench.scene import scene_from_options
+from harness.experiment.in_process import RunCell
+from harness.experiment.measuring import measurement_of
 from harness.experiment.subjects import objects
 from harness.experiment.tables import TableRow, measure
 from harness.experiment.tables import rows as rows_of
 from harness.recording.observation import Observation
 from harness.sim.optics.inverse import GelReader
+from tests.support.localization import conditions
 
-Results = dict[Cell, Mapping[str, Any]]
+MEASURED = measurement_of(EXPERIMENT)
+Results = dict[RunCell, Mapping[str, Any]]
 
 
 def result(errors: Mapping[str, float], held: bool = True, **more: Any) -> dict[str, Any]:
@@ -43,12 +47,12 @@ def result(errors: Mapping[str, float], held: bool = True, **more: Any) -> dict[
 def runs(errors: list[float], gap: str = "default", spacing: str = "close") -> Results:
     """One seed each."""
     return {
-        Cell("mug", spacing, gap, "known", seed): result({"touch": error}, held=error < GROSS)
+        ContactCell("mug", gap, seed, spacing): result({"touch": error}, held=error < GROSS)
         for seed, error in enumerate(errors)
     }
 
 
-GROSS = MEASUREMENT.gross
+GROSS = MEASURED.gross
 
 
 def rows(results: Results) -> list[TableRow]:
@@ -116,9 +120,7 @@ def test_the_order_of_the_runs_changes_no_value() -> None:
 
 
 def test_a_run_that_could_not_be_performed_is_no_localization_and_none_at_all_is_refused() -> None:
-    failed: Results = {
-        Cell("mug", "close", "default", "known", 99): {"schema": 1, "failed": "NotTouched: ..."}
-    }
+    failed: Results = {ContactCell("mug", "default", 99, "close"): {"schema": 1, "failed": "NotTouched: ..."}}
     assert row(rows({**runs(ERRORS), **failed}), "touch").runs == len(ERRORS)
     with pytest.raises(WrongUse, match="table"):
         rows(failed)
@@ -126,7 +128,7 @@ def test_a_run_that_could_not_be_performed_is_no_localization_and_none_at_all_is
 
 def test_a_row_counts_the_answers_that_were_refused() -> None:
     found = dict(runs(ERRORS))
-    found[Cell("mug", "close", "default", "known", 99)] = result({"touch": 70e-3}, refused="it does not fit")
+    found[ContactCell("mug", "default", 99, "close")] = result({"touch": 70e-3}, refused="it does not fit")
     assert row(rows(found), "touch").refused == 1
     assert row(rows(runs(ERRORS)), "touch").refused == 0
 
@@ -139,7 +141,7 @@ def test_a_refused_fit_of_the_right_object_is_a_failure_at_the_value_of_a_guess(
     observations = tuple(Observation(pose, blank) for pose in poses)
     true = np.array([0.02, -0.0075, 0.025])
     symmetry = find_symmetries(block.mesh)
-    answered = table._estimated(
+    answered = measurement._estimated(
         read(observations, GelReader(block.calibration), block, prior, seed=0),
         {SPACING.name: 3e-3},
         true,
@@ -161,14 +163,15 @@ def test_the_value_of_a_guess_is_the_mean_distance_over_the_surface(block: Model
 
 def test_a_table_that_is_stopped_is_even() -> None:
     """Every object of a seed comes before the next seed."""
-    wanted = cells(["mug", "bowl"], [5, 6], ["close", "spread"], ["default"], ["known", "unknown"])
+    chosen = conditions("close", "spread", yaws=["known", "unknown"])
+    wanted = MEASURED.cells(["mug", "bowl"], [5, 6], chosen)
     assert len(wanted) == len(set(wanted)) == 16
     assert [cell.seed for cell in wanted] == [5] * 8 + [6] * 8
     assert len({cell.name for cell in wanted}) == 16
 
 
 def test_what_is_on_the_disk_is_not_run_again(tmp_path: Path) -> None:
-    wanted = cells(["mug"], [0, 1], ["close"], ["default"], ["known"])
+    wanted = MEASURED.cells(["mug"], [0, 1], conditions("close"))
     for cell in wanted:
         written = result({"touch": 1e-3 * (1 + cell.seed)})
         (tmp_path / f"{cell.name}.json").write_text(json.dumps(written))
@@ -181,7 +184,7 @@ def test_what_is_on_the_disk_is_not_run_again(tmp_path: Path) -> None:
 def test_every_run_turns_the_object_by_an_angle_of_its_own() -> None:
     scene = scene_from_options("builtin:mug")
     one, same, other = (
-        scene_of(Cell("mug", "spread", gap, "known", seed), scene).model_dump(mode="json", by_alias=True)
+        ContactCell("mug", gap, seed, "spread").create_scene(scene).model_dump(mode="json", by_alias=True)
         for gap, seed in (("default", 3), ("none", 3), ("default", 4))
     )
     # The same seed meets the same contacts with the gap on and off: rows are paired.
@@ -196,4 +199,3 @@ def test_without_the_data_the_table_has_our_own_objects() -> None:
 
 def test_with_the_data_it_has_real_ones_too(shared_data: Path) -> None:
     assert set(objects(shared_data)) - set(objects(None)) == {"025_mug", "wineglass", "teapot"}
-    assert objects(shared_data, builtin_only=True).keys() == objects(None).keys()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.budget import places_left
+from experiments.contact_localization.accuracy.run import places_left
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.touch.touch import Contact
 from harness.recording.observation import Observation

@@ -1,9 +1,11 @@
+"""Answers of a cost curve are timed without the garbage collector."""
+
 import gc
 from collections.abc import Iterator
 
 import pytest
 
-from experiments.contact_localization.accuracy.benchmark_runs import _uncollected
+from harness.experiment.costing import _uncollected
 
 
 @pytest.fixture
