@@ -87,9 +87,14 @@ class TruthFile:
     def append(self, base_from_flange: FloatArray, step: int, sample: int) -> None:
         """Write where the press or the strike of ``step`` is, with the flange reported at this pose."""
         if sample == STRIKE and self._sound is not None:
-            self._contacts.setdefault(step, {"step": step})["strike"] = self._strike(
-                self._sound, base_from_flange, step
-            )
+            aim = self._sound.aim(base_from_flange, step, STRIKE)
+            self._contacts.setdefault(step, {"step": step})["strike"] = {
+                "point_in_object_m": None if aim.met is None else aim.met.nominal.tolist(),
+                "direction_in_object": aim.direction_in_object.tolist(),
+                "pulse_s": aim.blow.pulse,
+                "impulse_n_s": aim.blow.impulse,
+                "base_from_flange": base_from_flange.tolist(),
+            }
         else:
             self._contacts[step] = {
                 "step": step,
@@ -106,27 +111,13 @@ class TruthFile:
 
     def _write(self) -> None:
         if self._surface_sum is None:
-            self._surface_sum = self._write_surface()
+            world, path = self._world, surface_path(self._path)
+            vertices = apply(world.base_from_object, world.mesh.vertices)
+            write_arrays(path, {"vertices": vertices, "faces": world.mesh.faces})
+            self._surface_sum = sha256(path.read_bytes()).hexdigest()
         contacts = [self._contacts[index] for index in sorted(self._contacts)]
         fields = {**self._head, "surface_sha256": self._surface_sum, "contacts": contacts}
         write_truth_file(self._path, fields)
-
-    def _write_surface(self) -> str:
-        """Write the true surface; the SHA-256 of its file."""
-        world, path = self._world, surface_path(self._path)
-        vertices = apply(world.base_from_object, world.mesh.vertices)
-        write_arrays(path, {"vertices": vertices, "faces": world.mesh.faces})
-        return sha256(path.read_bytes()).hexdigest()
-
-    def _strike(self, sound: "WorldSound", base_from_flange: FloatArray, step: int) -> dict[str, Any]:
-        aim = sound.aim(base_from_flange, step, STRIKE)
-        return {
-            "point_in_object_m": None if aim.met is None else aim.met.nominal.tolist(),
-            "direction_in_object": aim.direction_in_object.tolist(),
-            "pulse_s": aim.blow.pulse,
-            "impulse_n_s": aim.blow.impulse,
-            "base_from_flange": base_from_flange.tolist(),
-        }
 
     def _resumed(self) -> dict[int, dict[str, Any]]:
         """The contacts of the same run; none where the file is damaged or of another run."""

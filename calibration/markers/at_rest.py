@@ -174,7 +174,18 @@ def lay_lattice(places: FloatArray) -> DotLattice:
             f"{len(places)} whole dots are in the picture; at least {LEAST_DOTS} are needed to tell a grid: "
             "is this the marked gel, in focus, and all of it in the picture?"
         )
-    across, down = _steps(places)
+    # From a dot to the next to the right and to the next below, ``(2,)`` pixels each.
+    near: IntArray = np.asarray(cKDTree(places).query(places, k=5)[1])
+    apart = (places[near[:, 1:]] - places[:, None]).reshape(-1, 2)
+    angle = np.arctan2(apart[:, 1], apart[:, 0])
+    folded = np.mean(np.exp(4j * angle))
+    if abs(folded) < LEAST_ORDER:
+        raise CalibrationRefused(
+            f"the dots' neighbours lie in all directions (order {abs(folded):.2f} of 1, {LEAST_ORDER:g} "
+            "wanted): these are not rows and columns of a print, but dirt, or another pattern"
+        )
+    turn = float(np.angle(folded)) / 4.0
+    across, down = _along(apart, turn), _along(apart, turn + 0.5 * np.pi)
     index = _walked(places, across, down)
     on = index[:, 0] >= 0
     if (
@@ -198,21 +209,6 @@ def lay_lattice(places: FloatArray) -> DotLattice:
         read_only(local),
         read_only(np.array(missing, dtype=np.int64).reshape(-1, 2)),
     )
-
-
-def _steps(places: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """From a dot to the next to the right and to the next below, ``(2,)`` pixels each."""
-    near: IntArray = np.asarray(cKDTree(places).query(places, k=5)[1])
-    apart = (places[near[:, 1:]] - places[:, None]).reshape(-1, 2)
-    angle = np.arctan2(apart[:, 1], apart[:, 0])
-    folded = np.mean(np.exp(4j * angle))
-    if abs(folded) < LEAST_ORDER:
-        raise CalibrationRefused(
-            f"the dots' neighbours lie in all directions (order {abs(folded):.2f} of 1, {LEAST_ORDER:g} "
-            "wanted): these are not rows and columns of a print, but dirt, or another pattern"
-        )
-    turn = float(np.angle(folded)) / 4.0
-    return _along(apart, turn), _along(apart, turn + 0.5 * np.pi)
 
 
 def _along(apart: FloatArray, direction: float) -> FloatArray:

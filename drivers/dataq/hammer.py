@@ -127,9 +127,25 @@ class DataqHammer:
                 hammer was not at rest before ``fire()``.
             ValueError: ``before + after`` is not positive or more than is kept.
         """
-        stream = self._opened()
-        self._check_durations(before, after)
-        since, rest = self._rested(stream)
+        if self._stream is None:
+            raise BenchFault(f"{self._name} was used before it was opened; open the bench first")
+        stream = self._stream
+        if not (before >= 0.0 and after > 0.0 and before + after + 2 * BLOCK / self._rate < self._memory):
+            raise ValueError(
+                f"{before:g} s before and {after:g} s after a strike were asked for; "
+                f"{self._memory:g} s are kept"
+            )
+        # Where the stream is and what the force rests at, once that is as calibrated.
+        if not self._rests.distinct:
+            stream.restart()
+        since = stream.settle()
+        rest = float(np.median(stream.rest(REST_WINDOW)[:, 0]))
+        if abs(rest - self._rests.offsets[0]) > self._rests.tolerance:
+            raise BenchFault(
+                f"{self._name}: before the strike the force is at {rest:.0f} counts, calibrated "
+                f"{self._rests.offsets[0]:.0f} within {self._rests.tolerance:.0f}; check what leans on the "
+                "hammer, its conditioner and its cable"
+            )
         fire()
         onset = stream.find(since, lambda scans: scans[:, 0] - rest >= self._threshold, now() + timeout)
         lead = round(before * self._rate)
@@ -163,11 +179,6 @@ class DataqHammer:
             self._name, identity, clock.rate if clock else 0.0, stream.drops, None, "; ".join(details)
         )
 
-    def _opened(self) -> ScanStream:
-        if self._stream is None:
-            raise BenchFault(f"{self._name} was used before it was opened; open the bench first")
-        return self._stream
-
     def _set_up(self, link: DataqLink) -> None:
         number = link.ask(f"info {MODEL}")
         if number != self._model.number:
@@ -192,27 +203,6 @@ class DataqHammer:
             link.ask(f"slist {slot} {slot}")
         link.ask(f"srate {divisor(int(dividend), self._rate, _CHANNELS, self._model)}")
         link.ask(f"ps {packet_exponent(self._rate, _CHANNELS)}")
-
-    def _check_durations(self, before: float, after: float) -> None:
-        if not (before >= 0.0 and after > 0.0 and before + after + 2 * BLOCK / self._rate < self._memory):
-            raise ValueError(
-                f"{before:g} s before and {after:g} s after a strike were asked for; "
-                f"{self._memory:g} s are kept"
-            )
-
-    def _rested(self, stream: ScanStream) -> tuple[Position, float]:
-        """Where the stream is and what the force rests at, once that is as calibrated."""
-        if not self._rests.distinct:
-            stream.restart()
-        position = stream.settle()
-        rest = float(np.median(stream.rest(REST_WINDOW)[:, 0]))
-        if abs(rest - self._rests.offsets[0]) > self._rests.tolerance:
-            raise BenchFault(
-                f"{self._name}: before the strike the force is at {rest:.0f} counts, calibrated "
-                f"{self._rests.offsets[0]:.0f} within {self._rests.tolerance:.0f}; check what leans on the "
-                "hammer, its conditioner and its cable"
-            )
-        return position, rest
 
     def _readings(self, words: AnyArray, first: Position, clock: ClockFit) -> tuple[Reading, ...]:
         starts = clock.time(first.scan), clock.time(first.scan + 1.0 / _CHANNELS)

@@ -93,7 +93,18 @@ class StreamMonitor:
             emptied: whether the port held nothing more.
         """
         if emptied:
-            self._see_time(total, time)
+            late = self.lateness(total, time)
+            allowed = self._allowed(time)
+            if late <= allowed:
+                self.prompt, self._late = total, []
+                self.clock.arrived(total - 1, time)
+                self._refit(time)
+            elif not self._late or time > self._late_until:
+                self._judge_lateness()
+                self._late.append(late)
+                self._late_until = time + STEADY
+            else:
+                self._late[-1] = min(self._late[-1], late)
         self._window.append(scans)
         self._windowed += len(scans)
         if self._windowed >= REST_WINDOW * self._rate:
@@ -117,20 +128,6 @@ class StreamMonitor:
         nominal = time - (total - 1) / self._rate
         self._earliest = min(self._earliest, nominal)
         return nominal - self._earliest
-
-    def _see_time(self, total: int, time: float) -> None:
-        late = self.lateness(total, time)
-        allowed = self._allowed(time)
-        if late <= allowed:
-            self.prompt, self._late = total, []
-            self.clock.arrived(total - 1, time)
-            self._refit(time)
-        elif not self._late or time > self._late_until:
-            self._judge_lateness()
-            self._late.append(late)
-            self._late_until = time + STEADY
-        else:
-            self._late[-1] = min(self._late[-1], late)
 
     def _allowed(self, time: float) -> float:
         """Seconds of lateness of a prompt arrival, for what the clock is known to."""

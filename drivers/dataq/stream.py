@@ -254,7 +254,10 @@ class ScanStream:
                 if self._monitor.fault or self._asked:
                     self._recover(self._monitor.fault or "begun anew", bool(self._monitor.fault))
             except BenchFault as fault:
-                self._die(str(fault))
+                reason = str(fault)
+                with self._changed:
+                    self._dead = reason
+                    self._changed.notify_all()
                 return
 
     def _see(self, arrival: Arrival) -> None:
@@ -283,7 +286,8 @@ class ScanStream:
     def _recover(self, reason: str, lost: bool) -> None:
         """Stop, drain, start: the only way back to a known order."""
         with self._changed:
-            last = self._last_proven()
+            fit = self._monitor.fit
+            last = self._heard if fit is None else fit.time(self._monitor.prompt)
             if lost:
                 self.losses.append(reason)
         self._fetcher.end()
@@ -294,11 +298,6 @@ class ScanStream:
             self._ended, self._asked = reason, False
             self.drops += max(1, round((now() - last) * self._rate)) if lost else 0
             self._changed.notify_all()
-
-    def _last_proven(self) -> float:
-        """Bench-clock seconds of the newest scan up to which none is missing."""
-        fit = self._monitor.fit
-        return self._heard if fit is None else fit.time(self._monitor.prompt)
 
     def _silence(self) -> None:
         """Have the box stop, and answer: one that is deaf would later obey all it was told at once.
@@ -320,11 +319,6 @@ class ScanStream:
             else:
                 self._link.drain()
                 return
-
-    def _die(self, reason: str) -> None:
-        with self._changed:
-            self._dead = reason
-            self._changed.notify_all()
 
 
 _READY: Final = 20.0

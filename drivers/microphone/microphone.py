@@ -308,16 +308,13 @@ class PortAudioMicrophone:
         # A loss shows in the blocks that follow it, so some are awaited that are not returned.
         self._hear(end + self._samples(1.1 * SETTLE), STALL)
         heard = self._blocks.since(first - self._samples(_CLOCK_SECONDS))
-        self._check_rate(heard)
-        return readings(heard, first, end, self.form, self._opened, flags)
-
-    def _check_rate(self, heard: list[Block]) -> None:
         rate = usual_rate(heard, self.form)
         if abs(rate / self.form.rate - 1.0) > RATE_TOLERANCE:
             raise BenchFault(
                 f"{self.name}: {self._device!r} delivers {rate:.0f} samples a second and "
                 f"{self.form.rate} were asked for; set a rate that the device has itself"
             )
+        return readings(heard, first, end, self.form, self._opened, flags)
 
 
 _lock = threading.Lock()

@@ -259,13 +259,11 @@ class ScaleAnswering:
         material = MATERIALS[model.scene.object.material]
         return {
             "vision": lambda: outline_alone(self._seen(), model.station.camera, model.place, model.sizes),
-            "audio": lambda: strikes_alone(self._ringing_strikes(), material, model.sizes),
+            "audio": lambda: strikes_alone(
+                () if self.peaks() is None else self.strikes, material, model.sizes
+            ),
             "touch": self._by_ways,
         }
-
-    def _ringing_strikes(self) -> Sequence[Strike]:
-        """All strikes; none where nothing rang, as of a microphone that is off."""
-        return () if self.peaks() is None else self.strikes
 
     def _seen(self) -> SeenOutline:
         if isinstance(self.outline, FitRefused):

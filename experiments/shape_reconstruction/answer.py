@@ -122,7 +122,14 @@ class ShapeAnswering:
             FitRefused: all readings together say too little.
         """
         evidence = self.readings.evidence()
-        given = self._given(evidence)
+        # What each sense that the scene asks for has read.
+        sensors, given = self.run.scene.sensors, {}
+        if sensors.camera:
+            given["vision"] = replace(evidence, touches=())
+        if sensors.touch:
+            given["touch"] = replace(evidence, look=None)
+        if not given:
+            raise WrongUse("the scene asks for no sense; set sensors.camera or sensors.touch")
         found: dict[str, ShapeEstimate | FitRefused] = {}
         seconds: dict[str, float] = {}
         for sense, one in given.items():
@@ -138,17 +145,6 @@ class ShapeAnswering:
         if isinstance(fused, FitRefused):
             raise fused
         return ShapeAnswer(evidence, fused, found, seconds)
-
-    def _given(self, evidence: ShapeEvidence) -> dict[str, ShapeEvidence]:
-        """What each sense that the scene asks for has read."""
-        sensors, given = self.run.scene.sensors, {}
-        if sensors.camera:
-            given["vision"] = replace(evidence, touches=())
-        if sensors.touch:
-            given["touch"] = replace(evidence, look=None)
-        if not given:
-            raise WrongUse("the scene asks for no sense; set sensors.camera or sensors.touch")
-        return given
 
     def _tried(self, evidence: ShapeEvidence) -> tuple[ShapeEstimate | FitRefused, float]:
         began = time.perf_counter()

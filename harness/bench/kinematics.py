@@ -40,7 +40,15 @@ def link_frames(model: str, joints: FloatArray) -> FloatArray:
     joints = np.asarray(joints, dtype=np.float64)
     frames = np.zeros((*joints.shape[:-1], 7, 4, 4))
     frames[..., 0, :, :] = np.eye(4)
-    steps = _steps(table, joints)
+    cos, sin = np.cos(joints), np.sin(joints)
+    twist_sin, twist_cos = np.array(TWIST_SINES), np.array(TWIST_COSINES)
+    a = np.array(table.a)
+    steps = np.zeros((*joints.shape, 4, 4))
+    steps[..., 0, 0], steps[..., 0, 1], steps[..., 0, 2] = cos, -sin * twist_cos, sin * twist_sin
+    steps[..., 1, 0], steps[..., 1, 1], steps[..., 1, 2] = sin, cos * twist_cos, -cos * twist_sin
+    steps[..., 2, 1], steps[..., 2, 2] = twist_sin, twist_cos
+    steps[..., 0, 3], steps[..., 1, 3], steps[..., 2, 3] = a * cos, a * sin, np.array(table.d)
+    steps[..., 3, 3] = 1.0
     for i in range(6):
         frames[..., i + 1, :, :] = frames[..., i, :, :] @ steps[..., i, :, :]
     return frames
@@ -126,20 +134,6 @@ def within_range(joints: FloatArray, seed_joints: FloatArray, joint_range: Float
     turned: FloatArray = joints + turn * np.clip(wanted, least, most)
     possible: FloatArray = turned[np.all(least <= most, axis=1)]
     return possible
-
-
-def _steps(table: ArmTable, joints: FloatArray) -> FloatArray:
-    """``(..., 6, 4, 4)``: each frame in the one before it."""
-    cos, sin = np.cos(joints), np.sin(joints)
-    twist_sin, twist_cos = np.array(TWIST_SINES), np.array(TWIST_COSINES)
-    a = np.array(table.a)
-    steps = np.zeros((*joints.shape, 4, 4))
-    steps[..., 0, 0], steps[..., 0, 1], steps[..., 0, 2] = cos, -sin * twist_cos, sin * twist_sin
-    steps[..., 1, 0], steps[..., 1, 1], steps[..., 1, 2] = sin, cos * twist_cos, -cos * twist_sin
-    steps[..., 2, 1], steps[..., 2, 2] = twist_sin, twist_cos
-    steps[..., 0, 3], steps[..., 1, 3], steps[..., 2, 3] = a * cos, a * sin, np.array(table.d)
-    steps[..., 3, 3] = 1.0
-    return steps
 
 
 def _shoulders(d4: float, x: float, y: float) -> list[float]:

@@ -191,7 +191,18 @@ def read_sensor(path: Path) -> SensorDescription:
         None if dots is None else MarkerGrid(dots.rows, dots.columns, dots.spacing, dots.radius),
         said.shadow.casts,
     )
-    _check(sensor, path)
+    reach = 0.5 * max(sensor.window)
+    if sensor.gel_radius is not None and sensor.gel_radius <= reach:
+        raise WrongUse(
+            f"{path}: a dome of {1e3 * sensor.gel_radius:g} mm radius does not span the window, which "
+            f"reaches {1e3 * reach:.1f} mm from its centre; check [gel_radius], [pitch] and [image]"
+        )
+    for side, window, housing in zip("xy", sensor.window, sensor.housing, strict=True):
+        if window > housing:
+            raise WrongUse(
+                f"{path}: the camera sees {1e3 * window:.1f} mm along {side} of a housing of "
+                f"{1e3 * housing:g} mm; check [pitch], [image] and [housing]"
+            )
     return SensorDescription(
         sensor,
         _beside(path, said.calibration),
@@ -213,21 +224,6 @@ def _beside(path: Path, calibration: str | None) -> str | None:
         return None
     beside = path.parent / calibration
     return str(real_path(beside)) if beside.is_file() else calibration
-
-
-def _check(sensor: TactileSensor, path: Path) -> None:
-    reach = 0.5 * max(sensor.window)
-    if sensor.gel_radius is not None and sensor.gel_radius <= reach:
-        raise WrongUse(
-            f"{path}: a dome of {1e3 * sensor.gel_radius:g} mm radius does not span the window, which "
-            f"reaches {1e3 * reach:.1f} mm from its centre; check [gel_radius], [pitch] and [image]"
-        )
-    for side, window, housing in zip("xy", sensor.window, sensor.housing, strict=True):
-        if window > housing:
-            raise WrongUse(
-                f"{path}: the camera sees {1e3 * window:.1f} mm along {side} of a housing of "
-                f"{1e3 * housing:g} mm; check [pitch], [image] and [housing]"
-            )
 
 
 GELSIGHT_R15 = described_sensor(DEFAULT_MAKE).sensor

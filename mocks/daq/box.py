@@ -127,20 +127,17 @@ class CommandInterpreter:
                 answers = {0: _MAKER, 1: model.name, 2: "129", 6: self._serial, 9: str(model.dividend)}
                 return answers.get(question, "0")
             case "slist", [slot, source] if not self.scanning:
-                return self._list(slot, source)
+                if source not in _INPUTS or slot > len(self.scan_list):
+                    return None
+                self.scan_list = self.scan_list[:slot]
+                if source in self.scan_list:
+                    return None
+                self.scan_list.append(source)
+                return ""
             case _, [number] if not self.scanning and number in self._allowed.get(name, ()):
                 self._set[name] = number
                 return ""
         return None
-
-    def _list(self, slot: int, source: int) -> str | None:
-        if source not in _INPUTS or slot > len(self.scan_list):
-            return None
-        self.scan_list = self.scan_list[:slot]
-        if source in self.scan_list:
-            return None
-        self.scan_list.append(source)
-        return ""
 
 
 MEMORY = 4096
@@ -240,7 +237,18 @@ class DaqBox:
                 select.select([], [], [], _PERIOD)
             elif self._master >= 0:
                 self._obey()
-                self._sample()
+                # Take the scans that are due, in steps, and let them out as the cable takes them.
+                due = math.floor((now() - self._began) * self._scan_rate) if self._instrument.scanning else 0
+                step = max(1, (MEMORY // (2 * len(self._instrument.scan_list))) // 2)
+                while self._instrument.scanning and self._taken < due:
+                    count = min(step, due - self._taken)
+                    words, free = self._words(count), self._capacity - len(self._memory)
+                    self._memory += words[:free]  # the rest is lost, wherever in a scan that may be
+                    self._lost.value += max(0, len(words) - free)
+                    self._taken += count
+                    self._numbered += count * self._instrument.decimation
+                    self._let_out()
+                self._let_out()
                 select.select([self._master], [], [], self._until_packet())
 
     @property
@@ -282,23 +290,6 @@ class DaqBox:
             self._began, self._taken = now(), 0
             self._memory.clear()
         self._answers += answers
-
-    def _sample(self) -> None:
-        """Take the scans that are due, in steps, and let them out as the cable takes them."""
-        due = math.floor((now() - self._began) * self._scan_rate) if self._instrument.scanning else 0
-        step = max(1, self._memory_scans() // 2)
-        while self._instrument.scanning and self._taken < due:
-            count = min(step, due - self._taken)
-            words, free = self._words(count), self._capacity - len(self._memory)
-            self._memory += words[:free]  # the rest is lost, wherever in a scan that may be
-            self._lost.value += max(0, len(words) - free)
-            self._taken += count
-            self._numbered += count * self._instrument.decimation
-            self._let_out()
-        self._let_out()
-
-    def _memory_scans(self) -> int:
-        return MEMORY // (2 * len(self._instrument.scan_list))
 
     def _words(self, count: int) -> bytes:
         """``count`` scans as the instrument sends them."""

@@ -66,7 +66,7 @@ class InProcessHammer:
         fire()
         fired = [rise for rise in self._arm.rises[switched:] if rise.output == self._output]
         count = -(-round((before + after) * self._rate) // BLOCK) * BLOCK
-        quiet = self._idle_counts(count)
+        quiet = self._idle[np.arange(count) % len(self._idle)]
         record, self.fired = quiet, None
         if fired:
             pose, step, sample = fired[-1].base_from_flange, self._stage.step, self._stage.sample
@@ -86,9 +86,6 @@ class InProcessHammer:
     def health(self) -> Health:
         """Every sample, on time."""
         return Health("hammer", self._identity, self._rate, 0, None, "simulated time")
-
-    def _idle_counts(self, count: int) -> AnyArray:
-        return self._idle[np.arange(count) % len(self._idle)]
 
     def _readings(self, counts: AnyArray, start: float) -> tuple[Reading, ...]:
         edges = np.array([0.0, float(len(counts))])

@@ -87,7 +87,13 @@ class Faults:
             case "release_emergency_stop":
                 controller.robot.safety.release_button()
             case "drop":
-                self._drop(cue.seconds)
+                seconds = cue.seconds
+                self._rtde.drop()
+                for connection in self._others():
+                    connection.abort()
+                if seconds is not None:
+                    self._rtde.refusing = True
+                    self._last(seconds)
             case "freeze":
                 self._rtde.freeze(True)
                 self._last(cue.seconds)
@@ -107,15 +113,6 @@ class Faults:
         """End what has lasted long enough."""
         if self._until is not None and self._controller.robot.time >= self._until:
             self._clear()
-
-    def _drop(self, seconds: float | None) -> None:
-        """Without a duration connections may come back at once: a cable that was pulled and put back."""
-        self._rtde.drop()
-        for connection in self._others():
-            connection.abort()
-        if seconds is not None:
-            self._rtde.refusing = True
-            self._last(seconds)
 
     def _last(self, seconds: float | None) -> None:
         self._until = None if seconds is None else self._controller.robot.time + seconds

@@ -276,7 +276,10 @@ class WorldSound:
             if blow.bounce is not None:
                 later = times - blow.throw - blow.bounce
                 force = force + _half_sine(later, blow.pulse, blow.bounce_share * blow.impulse)
-            pressure = self._heard(force, aim.met, aim.direction_in_object, step, sample)
+            gains = self._modes.gains(aim.met.nominal[None], aim.direction_in_object[None])[0]
+            amplitudes = gains * self._levels * self._draw.strike_gains(len(gains), step, sample)
+            rung = ring(self.frequencies, self.dampings, amplitudes[None], force[None], self._rate)[0]
+            pressure: FloatArray = rung if self._room is None else reverberated(rung[None], self._room)[0]
         ambient = self.noise * self._draw.noise(len(times), 1, step, sample)[:, 0]
         heard = read_only(pressure + ambient)
         return StrikeTruth(self._rate, read_only(force), heard, aim)
@@ -308,15 +311,6 @@ class WorldSound:
             "modal_elements": modes.elements,
             "frequencies_hz": self.frequencies.tolist(),
         }
-
-    def _heard(
-        self, force: FloatArray, met: Met, direction: FloatArray, step: int, sample: int
-    ) -> FloatArray:
-        gains = self._modes.gains(met.nominal[None], direction[None])[0]
-        amplitudes = gains * self._levels * self._draw.strike_gains(len(gains), step, sample)
-        rung = ring(self.frequencies, self.dampings, amplitudes[None], force[None], self._rate)[0]
-        heard: FloatArray = rung if self._room is None else reverberated(rung[None], self._room)[0]
-        return heard
 
     def _room_of(self, gap: Gap) -> FloatArray | None:
         time = gap.sound.reverberation_time

@@ -311,11 +311,9 @@ class HousingContact:
         if push == 0.0:
             return np.zeros(6)
         weights = depth / depth.sum()
-        y, x = (side * _middles(count) for side, count in zip(self._sides[::-1], depth.shape, strict=True))
+        y, x = (
+            side * ((np.arange(count) + 0.5) / count - 0.5)
+            for side, count in zip(self._sides[::-1], depth.shape, strict=True)
+        )
         at_x, at_y = float(weights.sum(axis=0) @ x), float(weights.sum(axis=1) @ y)
         return np.array([0.0, 0.0, -push, -at_y * push, at_x * push, 0.0])
-
-
-def _middles(count: int) -> FloatArray:
-    """``(count,)`` of a side of length one, about its middle."""
-    return (np.arange(count) + 0.5) / count - 0.5

@@ -99,7 +99,7 @@ class BallPresses:
         """One press or one look at the untouched gel; the arm ends at the stand-off."""
         motion = PressMotion.from_parameters(dict(step.parameters))
         bench.mark(step.index, -1)
-        self._travel(motion, bench)
+        travel(bench, motion.start, motion.travel, self._way, _TRAVEL, _TRAVEL_ACCELERATION)
         rest = settle(bench.gel, bench.pause, self._settings.still)
         self._watch.require_light(look(rest.frames))
         if step.kind == "background":
@@ -200,9 +200,6 @@ class BallPresses:
 
     def _back(self, bench: Bench, motion: PressMotion) -> None:
         self._to(bench, motion, 0.0, _APPROACH)
-
-    def _travel(self, motion: PressMotion, bench: Bench) -> None:
-        travel(bench, motion.start, motion.travel, self._way, _TRAVEL, _TRAVEL_ACCELERATION)
 
 
 def _numbers(settling: Settling, touched: bool) -> tuple[Reading, Reading]:

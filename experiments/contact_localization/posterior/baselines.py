@@ -148,7 +148,20 @@ class MfccTable:
         return np.asarray(self._features @ (heard / length), dtype=np.float64)
 
     def _unit_features(self, table: GainTable, modes: Modes, material: Material) -> AnyArray:
-        powers = _mode_powers(modes, material, self._rate, self._settings)
+        below = modes.frequencies < 0.5 * self._rate
+        times = np.arange(round(self._settings.duration * self._rate)) / self._rate
+        decays = dampings(modes.frequencies, material)
+        powers = np.concatenate(
+            [
+                _band_powers(
+                    (np.exp(-d * times) * np.sin(2.0 * np.pi * f * times) * sounds)[None],
+                    self._rate,
+                    self._settings,
+                )
+                for f, d, sounds in zip(modes.frequencies, decays, below, strict=True)
+            ]
+            or [np.zeros((0, _frames(self._rate, self._settings), self._settings.bands))]
+        )
         frames, bands = powers.shape[1:]
         normals = table.surface.normals
         rows = []
@@ -185,22 +198,6 @@ def mfcc_filter(
         return None if strike is None else table.similarities(strike)[at]
 
     return filtered(search, len(strikes), heard, particles, seed)
-
-
-def _mode_powers(modes: Modes, material: Material, rate: float, settings: Mfcc) -> FloatArray:
-    """``(m, frames, bands)`` of each mode struck with a unit impulse and heard by its displacement."""
-    below = modes.frequencies < 0.5 * rate
-    times = np.arange(round(settings.duration * rate)) / rate
-    decays = dampings(modes.frequencies, material)
-    return np.concatenate(
-        [
-            _band_powers(
-                (np.exp(-d * times) * np.sin(2.0 * np.pi * f * times) * sounds)[None], rate, settings
-            )
-            for f, d, sounds in zip(modes.frequencies, decays, below, strict=True)
-        ]
-        or [np.zeros((0, _frames(rate, settings), settings.bands))]
-    )
 
 
 def _band_powers(sounds: FloatArray, rate: float, settings: Mfcc) -> FloatArray:

@@ -154,7 +154,11 @@ class SoundTerm:
         self.scales: Scales = likely_scales(frequencies, modes.frequencies, noise)
         """frequency scales between object and model, most probable first."""
         self._pairs = pairs_of(frequencies, self._group_frequencies(), self.scales.factors, noise)
-        self._gain_scales = self._unit_gains()
+        squares = self._table.mean_squares
+        result = np.empty(len(squares))
+        for a, b in zip(self._starts[:-1], self._starts[1:], strict=True):
+            result[a:b] = 1.0 / np.sqrt(squares[a:b].mean())
+        self._gain_scales = np.asarray(result / np.array(self._noise.spreads)[:, None])
 
     @property
     def weight(self) -> float:
@@ -274,14 +278,6 @@ class SoundTerm:
         return np.array(
             [np.exp(logs[a:b].mean()) for a, b in zip(self._starts[:-1], self._starts[1:], strict=True)]
         )
-
-    def _unit_gains(self) -> FloatArray:
-        """``(C, m)``: one over the noise of a mode's gain; one figure a group, so that any basis will do."""
-        squares = self._table.mean_squares
-        result = np.empty(len(squares))
-        for a, b in zip(self._starts[:-1], self._starts[1:], strict=True):
-            result[a:b] = 1.0 / np.sqrt(squares[a:b].mean())
-        return np.asarray(result / np.array(self._noise.spreads)[:, None])
 
     def _row(self, index: int, struck: _Struck, scale_shares: FloatArray) -> ModeRow:
         peak, pairs = self._peaks[index], self._pairs

@@ -135,7 +135,10 @@ class FamilySearch:
         """
         random = np.random.default_rng(self.settings.seed + 1)
         placed = self._place(self._propose())
-        refined = self._refine_best(placed, seeds)
+        settings = self.settings
+        begun = [self.refine(one, FIRST_ROUNDS) for one in _stratified(placed, settings.starts)]
+        kept = [*_stratified(begun, settings.refined), *seeds]
+        refined = _ranked(self.refine(one, settings.refining) for one in kept)
         changed = self._change_parts(refined, random)
         varied = self._perturb_best(changed, random)
         return self._finish(changed, varied)
@@ -190,12 +193,6 @@ class FamilySearch:
         return Hypothesis(FamilyShape(shape.name, shape.code, theta), one.prior, cost, curvature)
 
     # Stage 3: refine all parameters of the best.
-
-    def _refine_best(self, placed: list[Hypothesis], seeds: Iterable[Hypothesis]) -> list[Hypothesis]:
-        settings = self.settings
-        begun = [self.refine(one, FIRST_ROUNDS) for one in _stratified(placed, settings.starts)]
-        kept = [*_stratified(begun, settings.refined), *seeds]
-        return _ranked(self.refine(one, settings.refining) for one in kept)
 
     def refine(self, one: Hypothesis, rounds: int, last: bool = False) -> Hypothesis:
         """Fit all free numbers of a hypothesis to all readings.

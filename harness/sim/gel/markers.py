@@ -220,7 +220,16 @@ def draw_markers(
         raise OutOfDomain(f"an ink that gives back {ink!r} of the light; give 0 to 1")
     drawn = images.copy()
     for n in range(len(images)):
-        cover = _coverage(dots + displacements[n], sensor)
+        centres = dots + displacements[n]
+        radius = _grid(sensor).radius / sensor.pitch
+        cover = np.zeros((sensor.rows, sensor.columns))
+        shift = np.array([sensor.columns, sensor.rows]) / 2.0 - 0.5
+        for x, y in centres / sensor.pitch + shift:
+            top, left = max(0, int(np.floor(y - radius))), max(0, int(np.floor(x - radius)))
+            here = cover[top : max(0, int(y + radius) + 2), left : max(0, int(x + radius) + 2)]
+            i, j = np.ogrid[top : top + here.shape[0], left : left + here.shape[1]]
+            edge = radius - np.hypot(i - y, j - x)
+            np.maximum(here, np.clip(0.5 + edge, 0.0, 1.0), out=here)
         under = cover > 0.0
         drawn[n][under] = np.rint(images[n][under] * (1.0 - (1.0 - ink) * cover[under])[:, None])
     return read_only(drawn)
@@ -257,20 +266,6 @@ def _moved(
     )
     moved: FloatArray = np.einsum("mkc,mk,k->mc", apart, per_metre, load)
     return moved
-
-
-def _coverage(centres: FloatArray, sensor: TactileSensor) -> FloatArray:
-    """``(rows, columns)`` the share of each pixel under a dot, from its distance to the dot's edge."""
-    radius = _grid(sensor).radius / sensor.pitch
-    cover = np.zeros((sensor.rows, sensor.columns))
-    shift = np.array([sensor.columns, sensor.rows]) / 2.0 - 0.5
-    for x, y in centres / sensor.pitch + shift:
-        top, left = max(0, int(np.floor(y - radius))), max(0, int(np.floor(x - radius)))
-        here = cover[top : max(0, int(y + radius) + 2), left : max(0, int(x + radius) + 2)]
-        i, j = np.ogrid[top : top + here.shape[0], left : left + here.shape[1]]
-        edge = radius - np.hypot(i - y, j - x)
-        np.maximum(here, np.clip(0.5 + edge, 0.0, 1.0), out=here)
-    return cover
 
 
 def layer_response(q: FloatArray) -> tuple[FloatArray, FloatArray]:

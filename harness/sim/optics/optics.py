@@ -86,7 +86,16 @@ class Optics:
         Raises:
             OutOfDomain: another shape than the camera's, or a height that is not finite.
         """
-        self._refuse(indentation)
+        shape = self.calibration.background.shape[:2]
+        if indentation.ndim != 3 or indentation.shape[1:] != shape:
+            raise OutOfDomain(
+                f"heights are {indentation.shape}; this camera's are (n, {shape[0]}, {shape[1]})"
+            )
+        bad = ~np.isfinite(indentation).all(axis=(1, 2))
+        if bad.any():
+            raise OutOfDomain(
+                f"the heights of contact {int(np.argmax(bad))} are not finite; there is no such gel"
+            )
         images = np.empty((*indentation.shape, 3), np.uint8)
         counts = np.empty((len(indentation), 2), np.int64)
         for n, pressed in enumerate(indentation):
@@ -151,18 +160,6 @@ class Optics:
         base = np.zeros_like(change)
         base[..., :3] = self.calibration.background - change[..., :3]
         return base
-
-    def _refuse(self, indentation: FloatArray) -> None:
-        shape = self.calibration.background.shape[:2]
-        if indentation.ndim != 3 or indentation.shape[1:] != shape:
-            raise OutOfDomain(
-                f"heights are {indentation.shape}; this camera's are (n, {shape[0]}, {shape[1]})"
-            )
-        bad = ~np.isfinite(indentation).all(axis=(1, 2))
-        if bad.any():
-            raise OutOfDomain(
-                f"the heights of contact {int(np.argmax(bad))} are not finite; there is no such gel"
-            )
 
 
 def with_camera_noise(images: AnyArray, sigma: float, seed: int) -> FloatArray:

@@ -201,20 +201,15 @@ class _Tables:
             if not product.size:
                 product = MEMORY.piece((rows, self._block), self._type)
                 product[:] = 0.0
-            starts = self._starts(group, begin, counts)
+            weights = self._weights[group.modes]
+            if begin:
+                weights = weights * self._steps.over(begin * self._block)[group.modes]
+            starts = MEMORY.piece((int(counts[0]), group.within.shape[1]), self._type)
+            for tile, count in enumerate(counts):
+                starts[max(count, 0) :, 2 * TILE * tile : 2 * TILE * (tile + 1)] = 0.0
+            fill(starts, counts, _in_tiles(weights), _in_tiles(self._ahead[group.modes]), self._floor, False)
             self._gemm(1.0, group.within.T, starts.T, 1.0, product[:rows].T, trans_a=True, overwrite_c=True)
         np.multiply(product, scale, out=sound[: len(product)], dtype=np.float64)
-
-    def _starts(self, group: _Group, begin: int, counts: IntArray) -> AnyArray:
-        """``(rows, 2 TILE tiles)``: where each block begins."""
-        weights = self._weights[group.modes]
-        if begin:
-            weights = weights * self._steps.over(begin * self._block)[group.modes]
-        starts = MEMORY.piece((int(counts[0]), group.within.shape[1]), self._type)
-        for tile, count in enumerate(counts):
-            starts[max(count, 0) :, 2 * TILE * tile : 2 * TILE * (tile + 1)] = 0.0
-        fill(starts, counts, _in_tiles(weights), _in_tiles(self._ahead[group.modes]), self._floor, False)
-        return starts
 
 
 def _together(counts: IntArray) -> list[slice]:

@@ -349,7 +349,16 @@ class _Translator:
         if word.text == "run":
             return self._run(word)
         if word.kind == "word":
-            return self._named(word)
+            # A call, a pose, or a variable; ``p[`` is a pose only where six values follow.
+            if self._words.comes("("):
+                return self._call(word)
+            before = self._words.at
+            if word.text == "p" and self._words.accept("["):
+                items = self._items()
+                if len(items) == _POSE_LENGTH:
+                    return _call("pose", word.line, *items)
+                self._words.at = before
+            return _of_frame("read", word.line, ast.Constant(word.text))
         if word.text == "[":
             return ast.List(self._items(), ast.Load())
         if word.text == "(":
@@ -358,18 +367,6 @@ class _Translator:
             return inside
         self._words.at -= 1
         raise self._words.unexpected("a value")
-
-    def _named(self, word: Token) -> ast.expr:
-        """A call, a pose, or a variable; ``p[`` is a pose only where six values follow."""
-        if self._words.comes("("):
-            return self._call(word)
-        before = self._words.at
-        if word.text == "p" and self._words.accept("["):
-            items = self._items()
-            if len(items) == _POSE_LENGTH:
-                return _call("pose", word.line, *items)
-            self._words.at = before
-        return _of_frame("read", word.line, ast.Constant(word.text))
 
     def _items(self) -> list[ast.expr]:
         """The rest of ``[a, b]``, after the bracket."""

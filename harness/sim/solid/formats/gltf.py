@@ -71,7 +71,10 @@ class _Reader(GltfData):
     meshes: dict[int, tuple[MeshPart, ...]] = field(default_factory=dict)
 
     def read(self) -> MeshFile:
-        self._check_version()
+        asset = self.mapping(self.tree.get("asset", {}), "asset")
+        version = asset.get("minVersion", asset.get("version"))
+        if not isinstance(version, str) or not version.startswith("2."):
+            raise MeshRefused(f"{self.path.name} is glTF of version {shown(version)}; export it as glTF 2.0")
         self._check_extensions()
         parts: list[MeshPart] = []
         triangles = placed = 0
@@ -102,12 +105,6 @@ class _Reader(GltfData):
         )
 
     # What the file requires
-
-    def _check_version(self) -> None:
-        asset = self.mapping(self.tree.get("asset", {}), "asset")
-        version = asset.get("minVersion", asset.get("version"))
-        if not isinstance(version, str) or not version.startswith("2."):
-            raise MeshRefused(f"{self.path.name} is glTF of version {shown(version)}; export it as glTF 2.0")
 
     def _check_extensions(self) -> None:
         for name in self.entries("extensionsRequired"):
@@ -215,15 +212,11 @@ class _Reader(GltfData):
             return tuple(self._primitives(mesh, weights))
         if number not in self.meshes:
             parts = tuple(self._primitives(mesh, []))
-            self._check_steps(parts)
+            vertices = np.vstack([np.zeros((0, 3)), *(part.vertices for part in parts)])
+            if np.isfinite(vertices).all() and len(vertices) and np.ptp(vertices, axis=0).max() > 0.0:
+                move_near(vertices, np.arange(len(vertices)), self.path.name, single=True)
             self.meshes[number] = parts
         return self.meshes[number]
-
-    def _check_steps(self, parts: tuple[MeshPart, ...]) -> None:
-        """Refuse a mesh so far from its own origin that 32 bits do not hold its shape."""
-        vertices = np.vstack([np.zeros((0, 3)), *(part.vertices for part in parts)])
-        if np.isfinite(vertices).all() and len(vertices) and np.ptp(vertices, axis=0).max() > 0.0:
-            move_near(vertices, np.arange(len(vertices)), self.path.name, single=True)
 
     def _primitives(self, mesh: dict[str, Any], weights: list[Any]) -> Iterator[MeshPart]:
         for entry in _listed(mesh.get("primitives", [])):
@@ -357,18 +350,15 @@ class _Reader(GltfData):
             raise self.refuse(
                 f"{name} holds {len(at)} places for {len(part.vertices)} vertices, or no numbers"
             )
-        at = self._transformed(at, transform)
-        self._note_wrapping(texture, at)
-        return picture, np.stack([at[:, 0], 1.0 - at[:, 1]], axis=1)[part.faces]
-
-    def _transformed(self, at: FloatArray, transform: dict[str, Any]) -> FloatArray:
-        """Texture places after ``KHR_texture_transform``: scaled, turned counter-clockwise, then moved."""
+        # Texture places after ``KHR_texture_transform``: scaled, turned counter-clockwise, then moved.
         scale = self.numbers(transform.get("scale", [1, 1]), 2, "a texture's scale")
         offset = self.numbers(transform.get("offset", [0, 0]), 2, "a texture's offset")
         angle = self.numbers([transform.get("rotation", 0)], 1, "a texture's rotation")[0]
         cosine, sine = np.cos(angle), np.sin(angle)
         # v points down: the rotation that looks counter-clockwise has the sine's other sign.
-        return np.asarray((at * scale) @ np.array([[cosine, sine], [-sine, cosine]]).T + offset)
+        at = np.asarray((at * scale) @ np.array([[cosine, sine], [-sine, cosine]]).T + offset)
+        self._note_wrapping(texture, at)
+        return picture, np.stack([at[:, 0], 1.0 - at[:, 1]], axis=1)[part.faces]
 
     def _note_wrapping(self, texture: dict[str, Any], at: FloatArray) -> None:
         if "sampler" not in texture or (at.min() >= -1e-6 and at.max() <= 1.0 + 1e-6):

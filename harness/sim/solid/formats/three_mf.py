@@ -165,7 +165,9 @@ class _Reader:
             above: set[_Key] = set()
             while waiting:
                 key, is_left = waiting.pop()
-                found = self._object(key)
+                if key not in self.objects:
+                    raise self.refuse(f"object {key[1]!r} is built, and {key[0]} has no such object")
+                found = self.objects[key]
                 if is_left:
                     above.discard(key)
                     inner = [amounts[of] for of, _ in found.components]
@@ -184,11 +186,6 @@ class _Reader:
             raise MeshRefused(
                 f"{self.name} nests {nodes:,} components; at most {MAX_NODES:,} are read, join them"
             )
-
-    def _object(self, key: _Key) -> _Object:
-        if key not in self.objects:
-            raise self.refuse(f"object {key[1]!r} is built, and {key[0]} has no such object")
-        return self.objects[key]
 
     def _part(self, key: _Key, found: _Object) -> MeshPart:
         vertices = np.array(found.vertices).reshape(-1, 3)
