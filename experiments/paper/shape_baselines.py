@@ -10,20 +10,19 @@ from scipy.spatial import QhullError, cKDTree
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.fits import UNOBSERVED, ShapeEstimate
 from experiments.shape_reconstruction.prior.network import require_silhouette, shipped
-from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples
 from experiments.shape_reconstruction.smooth.free_space import (
+    ContactSamples,
     Silhouette,
+    all_samples,
+    beyond_deviation,
+    known_by,
+    limited_sides,
+    not_bounded,
     sensor_depth,
     shift_sigma,
     silhouette_of,
 )
 from experiments.shape_reconstruction.smooth.grid import Grid
-from experiments.shape_reconstruction.smooth.knowledge import (
-    beyond_deviation,
-    known_by,
-    limited_sides,
-    not_bounded,
-)
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import FitRefused
 from harness.basics.faces.mesh_rays import column_crossings

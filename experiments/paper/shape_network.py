@@ -18,7 +18,7 @@ from experiments.shape_reconstruction.prior.network import (
     network_output,
     window_of,
 )
-from experiments.shape_reconstruction.smooth.contact_samples import all_samples
+from experiments.shape_reconstruction.smooth.free_space import all_samples
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused, OutOfDomain
 from harness.objectfile.runtime import Network

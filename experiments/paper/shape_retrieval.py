@@ -13,17 +13,17 @@ from scipy.spatial.distance import cdist
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.fits import ShapeEstimate
-from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
 from experiments.shape_reconstruction.smooth.free_space import (
+    ContactSamples,
     Silhouette,
-    sensor_depth,
-    silhouette_of,
-)
-from experiments.shape_reconstruction.smooth.knowledge import (
+    all_samples,
     beyond_deviation,
     known_by,
     limited_sides,
     not_bounded,
+    sensor_depth,
+    silhouette_of,
+    thinned,
 )
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import MeshRefused, WrongUse

@@ -10,7 +10,7 @@ import numpy as np
 from experiments.shape_reconstruction.evidence import GuardedTouch, SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.family.search import CONTINUED, LEVELS, FamilySettings
 from experiments.shape_reconstruction.fits import ShapeEstimate
-from experiments.shape_reconstruction.prior.surface import predict_surface
+from experiments.shape_reconstruction.prior.network import predict_surface
 from experiments.shape_reconstruction.reconstruct import reconstruct, reconstruct_with_prior
 from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.smooth.stated_space import require_stated_size, require_stated_space

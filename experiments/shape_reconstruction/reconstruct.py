@@ -18,8 +18,7 @@ from experiments.shape_reconstruction.family.estimate import POINT_SIGMA, fit_fa
 from experiments.shape_reconstruction.family.observed import directions_of
 from experiments.shape_reconstruction.family.search import LEVELS, FamilySearch, FamilySettings, Hypothesis
 from experiments.shape_reconstruction.fits import TOUCHED, FamilyFit, ShapeEstimate, SmoothSurface, folds_of
-from experiments.shape_reconstruction.prior.network import with_prior_points
-from experiments.shape_reconstruction.prior.surface import predict_surface
+from experiments.shape_reconstruction.prior.network import predict_surface, with_prior_points
 from experiments.shape_reconstruction.smooth.bent_prior import bend_prior
 from experiments.shape_reconstruction.smooth.free_space import shift_sigma
 from experiments.shape_reconstruction.smooth.hermite import fit_rbf

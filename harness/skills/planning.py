@@ -174,4 +174,4 @@ class Itinerary:
         if not self.contacts:
             return self._start
         struck = len(self.strikes) == len(self.contacts)
-        return self.strikes[-1].ready_joints if struck else self.contacts[-1].stand_off_joints
+        return self.strikes[-1].stand_off_joints if struck else self.contacts[-1].stand_off_joints

@@ -16,8 +16,8 @@ from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import apply, inverse, transform
 from harness.basics.mesh import Mesh
+from harness.bench.kinematics import LINKS, TWIST_COSINES, TWIST_SINES, ArmTable, arm_table
 from harness.bench.sensor import TactileSensor
-from harness.bench.ur_tables import LINKS, TWIST_COSINES, TWIST_SINES, ArmTable, arm_table
 from harness.twin.link_hulls import link_hulls
 from harness.twin.triangles import ConvexBody, Solid
 

@@ -16,7 +16,7 @@ import numpy as np
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused
 from harness.basics.geometry import apply, rotation_from_vector, transform
-from harness.bench.ur_tables import ARM_TABLES, LINKS, arm_table
+from harness.bench.kinematics import ARM_TABLES, LINKS, arm_table
 
 _FILES: Final = ("base", "shoulder", "upperarm", "forearm", "wrist1", "wrist2", "wrist3")
 

@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -33,29 +33,39 @@ class Approach:
 
 
 @dataclass(frozen=True, eq=False)
-class PlannedContact:
-    """A contact with every motion to and from it."""
+class _Planned:
+    """Travel to a contact or a strike."""
+
+    travelling: ClassVar[str]  #: name of the travel's segments.
 
     start: FloatArray  #: ``(6,)`` rad, where the travel starts.
     travel: FloatArray  #: ``(n, 6)`` rad, joint motions; the last is the stand-off. Empty if it starts there.
+
+    @property
+    def stand_off_joints(self) -> FloatArray:
+        """``(6,)`` rad: where the contact or the strike begins and ends."""
+        return self.travel[-1] if len(self.travel) else self.start
+
+    def travels(self, step: int) -> tuple[Segment, ...]:
+        """Return the joint motions to the stand-off."""
+        stations = [self.start, *self.travel]
+        return tuple(Segment(step, self.travelling, "joint", a, b) for a, b in itertools.pairwise(stations))
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedContact(_Planned):
+    """A contact with every motion to and from it."""
+
+    travelling = "travel"
+
     base_from_stand_off: FloatArray  #: ``(4, 4)`` of the flange.
     base_from_pressed: FloatArray  #: ``(4, 4)`` of the flange.
     pressed_joints: FloatArray  #: ``(6,)`` rad.
     stand_off: float  #: m from there to the press.
 
-    @property
-    def stand_off_joints(self) -> FloatArray:
-        """``(6,)`` rad: where the contact begins and ends."""
-        return self.travel[-1] if len(self.travel) else self.start
-
     def segments(self, step: int) -> tuple[Segment, ...]:
-        """What the arm does for this contact, to be rehearsed."""
+        """Return what the arm does for this contact, to be rehearsed."""
         return (*self.travels(step), *self.lines(step))
-
-    def travels(self, step: int) -> tuple[Segment, ...]:
-        """The joint motions to the stand-off."""
-        stations = [self.start, *self.travel]
-        return tuple(Segment(step, "travel", "joint", a, b) for a, b in itertools.pairwise(stations))
 
     def searched(self, step: int, beyond: float, axis: FloatArray) -> Segment:
         """The line to the press and so many metres beyond, where the object may be met later or not at all.
@@ -235,36 +245,24 @@ YAWS: Final = 16  # turns about the strike that are looked at: the hammer is rou
 
 
 @dataclass(frozen=True, eq=False)
-class PlannedStrike:
+class PlannedStrike(_Planned):
     """A strike with every motion to and from it."""
 
-    start: FloatArray  #: ``(6,)`` rad, where the travel starts.
-    travel: FloatArray  #: ``(n, 6)`` rad, joint motions; the last is where the straight way begins.
-    base_from_ready: FloatArray  #: ``(4, 4)`` of the flange, there.
+    travelling = "travel to strike"
+
+    base_from_ready: FloatArray  #: ``(4, 4)`` of the flange where the straight way begins.
     base_from_firing: FloatArray  #: ``(4, 4)`` of the flange, the tip at its stand-off from the surface.
     firing_joints: FloatArray  #: ``(6,)`` rad.
     axis: FloatArray  #: ``(3,)`` unit in base, the way of the strike.
 
-    @property
-    def ready_joints(self) -> FloatArray:
-        """``(6,)`` rad: where the strike begins and ends."""
-        return self.travel[-1] if len(self.travel) else self.start
-
     def segments(self, step: int) -> tuple[Segment, ...]:
-        """What the arm does for this strike, to be rehearsed; it touches nothing, the striker does."""
+        """Return what the arm does for this strike, to be rehearsed; it touches nothing, the striker does."""
         return (*self.travels(step), *self.lines(step))
-
-    def travels(self, step: int) -> tuple[Segment, ...]:
-        """The joint motions to where the strike begins."""
-        stations = [self.start, *self.travel]
-        return tuple(
-            Segment(step, "travel to strike", "joint", a, b) for a, b in itertools.pairwise(stations)
-        )
 
     def lines(self, step: int) -> tuple[Segment, Segment]:
         """There and back along the strike."""
         return (
-            Segment(step, "strike", "line", self.ready_joints, self.base_from_firing),
+            Segment(step, "strike", "line", self.stand_off_joints, self.base_from_firing),
             Segment(step, "draw back", "line", self.firing_joints, self.base_from_ready),
         )
 

@@ -23,9 +23,8 @@ from harness.bench.scene import SceneFile
 from harness.sim.modal.modal import default_edge, from_arrays, solve_modes, to_arrays
 from harness.sim.modal.modes import Modes, dampings
 from harness.sim.modal.solve import Elasticity
-from harness.sim.solid.surface_measure import wall_thickness
 from harness.sim.solid.tetrahedra import Tetrahedra, signed_volumes, tetrahedra, tetrahedralize
-from harness.sim.solid.walls import walled
+from harness.sim.solid.walls import wall_thickness, walled
 from harness.sim.sound.modal_sound import radiation
 from mocks.world.gap_draw import GapDraw
 from mocks.world.sound import SoundDraw, SoundingObject

@@ -279,7 +279,7 @@ class WorldSound:
             gains = self._modes.gains(aim.met.nominal[None], aim.direction_in_object[None])[0]
             amplitudes = gains * self._levels * self._draw.strike_gains(len(gains), step, sample)
             rung = ring(self.frequencies, self.dampings, amplitudes[None], force[None], self._rate)[0]
-            pressure: FloatArray = rung if self._room is None else reverberated(rung[None], self._room)[0]
+            pressure = rung if self._room is None else reverberated(rung[None], self._room)[0]
         ambient = self.noise * self._draw.noise(len(times), 1, step, sample)[:, 0]
         heard = read_only(pressure + ambient)
         return StrikeTruth(self._rate, read_only(force), heard, aim)

@@ -30,7 +30,7 @@ from harness.objects.builtin import BUILTIN
 from harness.objects.household import MATERIALS
 from harness.sim.modal.modal import default_edge
 from harness.sim.modal.solve import cpu, wall
-from harness.sim.solid.surface_source import surface_of
+from harness.sim.solid.intake import surface_of
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell
 from tests.support.real_data import WHY_NOT, find_shared_data

@@ -16,7 +16,7 @@ from harness.basics.mesh import Mesh
 from harness.objects.solid import from_manifold
 from harness.sim.modal.file import modes_of_file
 from harness.sim.modal.solve import solve_mesh
-from harness.sim.solid.modal_mesh import QuadraticMesh
+from harness.sim.solid.tetrahedra import QuadraticMesh
 from tests.oracles.exact_solids import exact_box
 from tests.oracles.ritz_box import ritz_frequencies
 from tests.oracles.volume_meshes import box

@@ -16,7 +16,7 @@ import pytest
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.materials import Material
-from harness.sim.solid.modal_mesh import QuadraticMesh
+from harness.sim.solid.tetrahedra import QuadraticMesh
 
 WHY_NOT = "CalculiX is not installed (no ccx on the path; on Debian: apt-get install calculix-ccx)"
 

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.materials import Material
-from harness.sim.solid.modal_mesh import QuadraticMesh
+from harness.sim.solid.tetrahedra import QuadraticMesh
 
 
 def guided_plate(side: float, thickness: float, of: Material, waves: int = 2) -> FloatArray:

@@ -8,8 +8,7 @@ from scipy.special import spherical_jn, spherical_yn
 
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.materials import Material
-from harness.sim.solid.modal_mesh import QuadraticMesh, quadratic_mesh
-from harness.sim.solid.tetrahedra import tetrahedra
+from harness.sim.solid.tetrahedra import QuadraticMesh, quadratic_mesh, tetrahedra
 from tests.oracles.volume_meshes import grid_cells
 
 Sides = tuple[float, float, float]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
-from harness.sim.solid.modal_mesh import QuadraticMesh
+from harness.sim.solid.tetrahedra import QuadraticMesh
 from tests.oracles.exact_solids import mapped
 from tests.oracles.volume_meshes import grid_cells
 

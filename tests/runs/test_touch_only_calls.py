@@ -24,7 +24,7 @@ OF_SOUND = (
     "harness.sim.sound.room",
     "harness.sim.modal.modal",
     "harness.sim.modal.solve",
-    "harness.sim.solid.modal_mesh",
+    "harness.sim.solid.tetrahedra",
     "harness.sim.sound.modal_sound",
     "harness.sim.modal.system",
     "harness.sim.modal.modes",

@@ -2,9 +2,8 @@
 
 from harness.objects.household import build
 from harness.sim.modal.modal import curved
-from harness.sim.solid.modal_mesh import QuadraticMesh
-from harness.sim.solid.surface_measure import thin_wall
-from harness.sim.solid.tetrahedra import tetrahedralize
+from harness.sim.solid.tetrahedra import QuadraticMesh, tetrahedralize
+from harness.sim.solid.walls import thin_wall
 
 _EDGE = 3.9e-3
 _UNKNOWNS = 108_000

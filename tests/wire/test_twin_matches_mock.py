@@ -5,8 +5,8 @@ import pytest
 
 from harness.basics.geometry import translation
 from harness.bench import kinematics
+from harness.bench.kinematics import ARM_TABLES
 from harness.bench.sensor import GELSIGHT_R15
-from harness.bench.ur_tables import ARM_TABLES
 from harness.objects.household import build
 from harness.twin.bench import TwinBench
 from mocks.ur.arm import kinematics as controller

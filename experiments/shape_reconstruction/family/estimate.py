@@ -25,10 +25,13 @@ from experiments.shape_reconstruction.family.kind import FamilyShape
 from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
 from experiments.shape_reconstruction.family.search import LEVELS, FamilySearch, FamilySettings, Hypothesis
 from experiments.shape_reconstruction.fits import SEEN, TOUCHED, UNOBSERVED, FamilyFit
-from experiments.shape_reconstruction.smooth.contact_samples import all_samples
-from experiments.shape_reconstruction.smooth.free_space import silhouette_of
-from experiments.shape_reconstruction.smooth.knowledge import beyond_deviation, limited_sides
-from experiments.shape_reconstruction.smooth.knowledge import not_bounded as open_axes
+from experiments.shape_reconstruction.smooth.free_space import (
+    all_samples,
+    beyond_deviation,
+    limited_sides,
+    silhouette_of,
+)
+from experiments.shape_reconstruction.smooth.free_space import not_bounded as open_axes
 from experiments.shape_reconstruction.smooth.stated_space import longest_side, max_offset
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.errors import FitRefused, OutOfDomain

@@ -11,12 +11,25 @@ from scipy.spatial.distance import cdist
 
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.fits import SmoothSurface, folds_of
-from experiments.shape_reconstruction.prior.network import require_silhouette, shipped
-from experiments.shape_reconstruction.prior.surface import BLUR, closing_field, prior_deviation
-from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
-from experiments.shape_reconstruction.smooth.free_space import CLEARANCE, Silhouette, sensor_depth
+from experiments.shape_reconstruction.prior.network import (
+    BLUR,
+    closing_field,
+    prior_deviation,
+    require_silhouette,
+    shipped,
+)
+from experiments.shape_reconstruction.smooth.free_space import (
+    CLEARANCE,
+    ContactSamples,
+    Silhouette,
+    all_samples,
+    known_by,
+    limited_sides,
+    not_bounded,
+    sensor_depth,
+    thinned,
+)
 from experiments.shape_reconstruction.smooth.grid import Grid
-from experiments.shape_reconstruction.smooth.knowledge import known_by, limited_sides, not_bounded
 from harness.basics.arrays import FloatArray, IntArray, read_only
 
 AMPLITUDE, LENGTH = 6.0e-3, 20.0e-3

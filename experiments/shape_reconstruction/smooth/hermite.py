@@ -20,13 +20,15 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.fits import SmoothSurface
-from experiments.shape_reconstruction.smooth import knowledge
-from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples, thinned
+from experiments.shape_reconstruction.smooth import free_space
 from experiments.shape_reconstruction.smooth.free_space import (
     CLEARANCE,
+    ContactSamples,
     Silhouette,
+    all_samples,
     sensor_depth,
     silhouette_of,
+    thinned,
 )
 from experiments.shape_reconstruction.smooth.grid import Grid
 from experiments.shape_reconstruction.smooth.revolution import (
@@ -217,10 +219,10 @@ def fit_rbf(evidence: ShapeEvidence, symmetric: bool = True) -> RbfFit:
         field = fitted(data.joined(rim), low, high, by_contacts.amplitude)
     grid = Grid.over(low, high, PITCH)
     body = grid.surface(grid.near_zero(_cut(field, bounds)), samples.points)
-    mesh, sides = body.mesh, knowledge.limited_sides(body.mesh, whole, silhouette)
-    known = knowledge.known_by(mesh, whole, silhouette)
-    beyond = knowledge.beyond_deviation(mesh, known, sides, evidence.largest)
-    hollow = knowledge.hollow_deviation(mesh, known, whole)
+    mesh, sides = body.mesh, free_space.limited_sides(body.mesh, whole, silhouette)
+    known = free_space.known_by(mesh, whole, silhouette)
+    beyond = free_space.beyond_deviation(mesh, known, sides, evidence.largest)
+    hollow = free_space.hollow_deviation(mesh, known, whole)
     smooth = _field_deviation(field, mesh.vertices)
     round_ = "supposed to be round about a vertical axis, as its contacts are" if axis else ""
     open_ = (
@@ -230,7 +232,7 @@ def fit_rbf(evidence: ShapeEvidence, symmetric: bool = True) -> RbfFit:
         mesh=mesh,
         deviation=np.sqrt(smooth**2 + READING**2 + beyond**2 + hollow**2),
         known_by=known,
-        not_bounded=knowledge.not_bounded(sides),
+        not_bounded=free_space.not_bounded(sides),
         doubtful=outliers,
         flags=(*(flag for flag in (round_, open_) if flag), *body.notes),
         seconds=time.perf_counter() - start,

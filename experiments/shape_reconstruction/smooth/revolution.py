@@ -13,8 +13,7 @@ from scipy.spatial import cKDTree
 
 from experiments.shape_reconstruction import thresholds as limits
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples
-from experiments.shape_reconstruction.smooth.free_space import sensor_depth
+from experiments.shape_reconstruction.smooth.free_space import ContactSamples, sensor_depth
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.geometry import rotation_about
 

@@ -22,7 +22,7 @@ from harness.sim.modal.file import modes_of_file
 from harness.sim.modal.modal import HEARING, default_edge, solved_once
 from harness.sim.modal.modes import Modes, dampings
 from harness.sim.modal.solve import CPU, Begin, cpu, timed, wall
-from harness.sim.solid.surface_source import surface_of
+from harness.sim.solid.intake import surface_of
 from harness.sim.solid.volume_mesh import read_volume
 
 STAGES = ("intake", "mesh", "assemble", "solve", "order", "train", "measure", "export", "verify")

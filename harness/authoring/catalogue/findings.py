@@ -11,12 +11,10 @@ from harness.basics.errors import DataRefused, MeshRefused, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.objects.builtin import BUILTIN
-from harness.sim.solid.intake import take_in
+from harness.sim.solid.intake import surface_of, take_in
 from harness.sim.solid.mesh_read import METRES, read_mesh
-from harness.sim.solid.surface_measure import enclosed_volume, thin_wall
-from harness.sim.solid.surface_source import surface_of
 from harness.sim.solid.tetrahedra import check_closed
-from harness.sim.solid.walls import walled
+from harness.sim.solid.walls import enclosed_volume, thin_wall, walled
 
 LABEL = 0.05
 """Relative: a label further than this from the longest side is of something else."""

@@ -15,7 +15,7 @@ from harness.objectfile.file import ObjectFile
 from harness.objectfile.touch.part import TouchPart, with_touch
 from harness.sim.gel.gel import skirt_for
 from harness.sim.gel.press_pose import MOST_MOVED
-from harness.sim.solid.surface_source import surface_of
+from harness.sim.solid.intake import surface_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from harness.objectfile.vision.part import VisionPart, with_vision
 from harness.objects.builtin import BUILTIN
 from harness.sim.light.appearance import Appearance
 from harness.sim.light.appearance_source import appearance_of
-from harness.sim.solid.surface_source import surface_of
+from harness.sim.solid.intake import surface_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,7 +65,7 @@ def vision(
     from harness.report.figures.figures import Album
     from harness.sim.light.appearance_source import appearance_of
     from harness.sim.light.direct_image import LitObject
-    from harness.sim.solid.surface_source import surface_of
+    from harness.sim.solid.intake import surface_of
 
     chosen = _chosen(vision_profile(profile).networks, size, knob)
     look = appearance_of(mesh, surface_of(mesh, units, None).units)

@@ -10,9 +10,8 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply, rotation_about, transform, translation
 from harness.basics.mesh import Mesh, closed_hull
-from harness.bench.kinematics import link_frames
+from harness.bench.kinematics import arm_table, link_frames
 from harness.bench.sensor import TactileSensor
-from harness.bench.ur_tables import arm_table
 from harness.picture.pinhole import Pinhole
 from harness.report.data import BenchPart, BenchScene, ContactRow
 from harness.report.figures.shading import Shot, look_at

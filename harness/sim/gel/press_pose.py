@@ -17,7 +17,7 @@ from harness.basics.geometry import frame_facing, inverse, rotation_about, trans
 from harness.basics.mesh import Mesh
 from harness.sim.gel.gel import require_depth
 from harness.sim.gel.height_map import SEARCH_DEPTH, STAND_OFF, rigid_poses
-from harness.sim.solid.surface_measure import nearest_on_surface
+from harness.sim.solid.walls import nearest_on_surface
 
 MOST_MOVED = 2e-3
 """Metres between a contact as it is asked for and the surface: farther is another frame or unit."""

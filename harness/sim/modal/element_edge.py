@@ -17,14 +17,14 @@ from harness.basics.store import Store
 from harness.sim.modal.modal import bending_wave, default_edge
 from harness.sim.solid.filled import filled
 from harness.sim.solid.modal_kernels import EDGES
-from harness.sim.solid.surface_measure import (
+from harness.sim.solid.tetrahedra import Tetrahedra, tetrahedra
+from harness.sim.solid.walls import (
     enclosed_volume,
     flat_share,
     nearest_on_surface,
     thin_wall,
     wall_thickness,
 )
-from harness.sim.solid.tetrahedra import Tetrahedra, tetrahedra
 
 _LAYER = 0.25
 """Of the wall, how far inside its rim cells are cut: the ten modes of a plate of 100 x 80 x 4 mm are off by

@@ -28,9 +28,8 @@ from harness.sim.modal.solve import (
     solve_mesh,
 )
 from harness.sim.solid.filled import filled
-from harness.sim.solid.modal_mesh import QuadraticMesh
-from harness.sim.solid.surface_source import surface_of
-from harness.sim.solid.tetrahedra import check_closed
+from harness.sim.solid.intake import surface_of
+from harness.sim.solid.tetrahedra import QuadraticMesh, check_closed
 from harness.sim.solid.volume_mesh import read_volume
 
 _UNLIMITED = 1e12

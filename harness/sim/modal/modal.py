@@ -21,9 +21,14 @@ from harness.sim.modal.modes import Modes
 from harness.sim.modal.solve import CPU, Begin, Elasticity, check_limit, ignore_stage, solve_mesh, timed
 from harness.sim.solid.filled import FillingSeconds, filled
 from harness.sim.solid.modal_kernels import MASS_POINTS, MASS_WEIGHTS, determinants, shape_slopes
-from harness.sim.solid.modal_mesh import QuadraticMesh, least_determinant, middles_of, quadratic_mesh
-from harness.sim.solid.surface_measure import enclosed_volume, nearest_on_surface, thin_wall
-from harness.sim.solid.tetrahedra import Tetrahedra
+from harness.sim.solid.tetrahedra import (
+    QuadraticMesh,
+    Tetrahedra,
+    least_determinant,
+    middles_of,
+    quadratic_mesh,
+)
+from harness.sim.solid.walls import enclosed_volume, nearest_on_surface, thin_wall
 
 VERSION = 4
 """Raised with every change of what is computed here, so that stored modes are dropped."""

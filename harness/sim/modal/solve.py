@@ -22,7 +22,7 @@ from harness.basics.mesh import Mesh
 from harness.sim.factor.factorisation import Factor, factorised, inertia
 from harness.sim.modal.modes import Modes
 from harness.sim.modal.system import MassRule, ModalSystem, modal_system
-from harness.sim.solid.modal_mesh import QuadraticMesh
+from harness.sim.solid.tetrahedra import QuadraticMesh
 
 _BLOCK = 8
 _PER_MODE = 6

@@ -21,7 +21,7 @@ from harness.sim.solid.modal_kernels import (
     pattern,
     shape_slopes,
 )
-from harness.sim.solid.modal_mesh import QuadraticMesh
+from harness.sim.solid.tetrahedra import QuadraticMesh
 
 SparseRows: TypeAlias = "sp.csr_array[Any]"
 MassRule: TypeAlias = Literal["consistent", "four points"]

@@ -17,14 +17,17 @@ from harness.sim.solid.formats.cells import CellFile
 from harness.sim.solid.intake import read_line
 from harness.sim.solid.mesh_read import METRES, SOLIDS, TETRAHEDRA, choose_up_axis, mesh_kind, read_cells
 from harness.sim.solid.modal_kernels import EDGES
-from harness.sim.solid.modal_mesh import (
+from harness.sim.solid.tetrahedra import (
     FACES,
+    FLATTEST,
     QuadraticMesh,
+    fullness,
+    joined_by_faces,
     least_determinant,
     quadratic_mesh,
+    signed_volumes,
     six_node_faces,
 )
-from harness.sim.solid.tetrahedra import FLATTEST, fullness, joined_by_faces, signed_volumes
 
 _SURFACES_ONLY = frozenset({".obj", ".stl", ".stl_ascii", ".ply", ".off", ".glb", ".gltf", ".3mf", ".dae"})
 _READINGS = ("m", "cm", "mm")

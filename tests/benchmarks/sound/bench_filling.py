@@ -21,8 +21,8 @@ from harness.basics.materials import material
 from harness.basics.mesh import Mesh
 from harness.objects.household import MATERIALS, build
 from harness.sim.modal.modal import HEARING, curved, default_edge, held_volume
-from harness.sim.solid.surface_measure import enclosed_volume
 from harness.sim.solid.tetrahedra import tetrahedra, tetrahedralize
+from harness.sim.solid.walls import enclosed_volume
 from tests.benchmarks.results import benchmark_parser, finish_figure, spread
 from tests.docs.results import Cell
 

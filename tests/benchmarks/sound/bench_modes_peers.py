@@ -21,7 +21,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.materials import MATERIALS, Material
 from harness.sim.modal.solve import Elasticity, solve_mesh
 from harness.sim.modal.system import modal_system
-from harness.sim.solid.modal_mesh import QuadraticMesh
+from harness.sim.solid.tetrahedra import QuadraticMesh
 from tests.benchmarks.results import benchmark_parser, finish_figure, spread
 from tests.oracles.calculix import WHY_NOT, Run, run, write_input
 from tests.samples.sized_mug import mug

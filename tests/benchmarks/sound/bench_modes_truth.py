@@ -19,7 +19,7 @@ from harness.objects.solid import from_manifold
 from harness.sim.modal.element_edge import finely_filled
 from harness.sim.modal.modal import curved
 from harness.sim.modal.solve import Solution, solve_mesh
-from harness.sim.solid.modal_mesh import QuadraticMesh
+from harness.sim.solid.tetrahedra import QuadraticMesh
 from tests.benchmarks.results import benchmark_parser, finish_figure, spread
 from tests.oracles.exact_bars import astm_bending, astm_torsion
 from tests.oracles.exact_plate import guided_plate, on_lower_edges, sliding_sides

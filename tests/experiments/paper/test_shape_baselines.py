@@ -19,9 +19,13 @@ from experiments.paper.shape_baselines import (
 from experiments.paper.shape_table import points_error
 from experiments.shape_reconstruction.fits import UNOBSERVED
 from experiments.shape_reconstruction.metric import shape_error
-from experiments.shape_reconstruction.smooth.contact_samples import all_samples
+from experiments.shape_reconstruction.smooth.free_space import (
+    all_samples,
+    beyond_deviation,
+    known_by,
+    limited_sides,
+)
 from experiments.shape_reconstruction.smooth.hermite import fit_rbf
-from experiments.shape_reconstruction.smooth.knowledge import beyond_deviation, known_by, limited_sides
 from harness.basics.errors import FitRefused
 from harness.basics.faces.mesh_rays import is_inside
 from harness.objects.builtin import build

@@ -32,7 +32,7 @@ from experiments.shape_reconstruction.prior.network import (
     window_of,
     window_points,
 )
-from experiments.shape_reconstruction.smooth.contact_samples import all_samples
+from experiments.shape_reconstruction.smooth.free_space import all_samples
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import DataRefused, FitRefused, WrongUse
 from harness.basics.faces.ray_mesh import RayMesh

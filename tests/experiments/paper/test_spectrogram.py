@@ -20,7 +20,7 @@ from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.basics.store import Store
 from harness.sim.modal.modes import Modes
-from harness.sim.solid.modal_mesh import quadratic_mesh
+from harness.sim.solid.tetrahedra import quadratic_mesh
 from tests.samples.object_bench import MODES, egg, egg_modes
 from tests.samples.sounding_plate import plate_modes
 

@@ -17,7 +17,7 @@ from experiments.scale_estimation.unseen.training.outlines import fitted, pictur
 from harness.basics.errors import FitRefused
 from harness.bench.station_file import Station
 from harness.sim.solid.household.families import FAMILIES, draw
-from harness.sim.solid.surface_measure import enclosed_volume
+from harness.sim.solid.walls import enclosed_volume
 from tests.experiments.scale_estimation.runs import answered, ran, scene_of
 from tests.experiments.scale_estimation.test_vision import FOCAL, PLACE, camera, nominal, outline_at, view_of
 

@@ -9,7 +9,7 @@ import trimesh
 from experiments.shape_reconstruction.family.estimate import fit_family
 from experiments.shape_reconstruction.family.search import LEVELS
 from experiments.shape_reconstruction.fits import TOUCHED
-from experiments.shape_reconstruction.prior.surface import predict_surface
+from experiments.shape_reconstruction.prior.network import predict_surface
 from experiments.shape_reconstruction.reconstruct import outline_error, predict_left_out
 from experiments.shape_reconstruction.smooth.bent_prior import bend_prior
 from experiments.shape_reconstruction.smooth.free_space import CLEARANCE, sensor_depth

@@ -12,7 +12,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import rotation_about, transform
 from harness.bench import kinematics
-from harness.bench.ur_tables import ARM_TABLES, arm_table
+from harness.bench.kinematics import ARM_TABLES, arm_table
 
 PI = np.pi
 models = st.sampled_from(sorted(ARM_TABLES))

@@ -10,7 +10,7 @@ from harness.basics.geometry import UPRIGHT
 from harness.bench.scene import SceneFile, scene_from_json, scene_from_options
 from harness.effects.scene_object import known_object
 from harness.sim.light.appearance_source import read_appearance
-from harness.sim.solid.surface_source import surface_of
+from harness.sim.solid.intake import surface_of
 from harness.sim.solid.volume_mesh import read_volume
 from tests.support.made_meshes import CORNERS, FACES, SIDES
 

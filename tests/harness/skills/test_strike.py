@@ -173,7 +173,7 @@ def test_every_contact_of_a_scene_with_sound_has_its_strike(plan: RunPlan) -> No
         motion = StrikeMotion.from_parameters(step["strike"])
         np.testing.assert_allclose(motion.axis, site.base_from_gel[:3, 2], atol=1e-9)
         np.testing.assert_array_equal(motion.start, contact.stand_off_joints)
-    np.testing.assert_array_equal(plan.contacts[1].start, plan.strikes[0].ready_joints)
+    np.testing.assert_array_equal(plan.contacts[1].start, plan.strikes[0].stand_off_joints)
 
 
 def test_a_touch_only_scene_plans_no_strike(both: SceneFile) -> None:

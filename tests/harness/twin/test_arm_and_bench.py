@@ -11,8 +11,8 @@ from harness.basics.errors import WrongUse
 from harness.basics.geometry import apply, rotation_about, transform, translation
 from harness.basics.mesh import Mesh
 from harness.bench import kinematics
+from harness.bench.kinematics import ARM_TABLES, LINKS, arm_table
 from harness.bench.sensor import GELSIGHT_R15
-from harness.bench.ur_tables import ARM_TABLES, LINKS, arm_table
 from harness.objects.household import build
 from harness.twin.bench import TwinBench, add_arm, arm_parts, link_from_previous, reaches
 from harness.twin.link_hulls import link_hulls, placed

@@ -73,7 +73,7 @@ def test_a_press_and_its_strike_are_rehearsed_in_a_row_and_nothing_is_refused(
         assert contact is not None
         strike = planned(planner, press, contact.stand_off_joints)
         segments += [*contact.segments(step), *strike.segments(step)]
-        joints = strike.ready_joints
+        joints = strike.stand_off_joints
     report = rehearse(bench, segments)
     assert report.refusals == ()
     labels = [segment.label for segment in segments if segment.step == 1]
@@ -84,7 +84,7 @@ def test_the_rehearsal_refuses_a_tip_that_would_touch(bench: TwinBench, planner:
     press, _ = wall(bench, 0.9, 0.05)
     strike = planned(planner, press, HOME)
     nearer = translation((STAND_OFF - 1e-3) * strike.axis) @ strike.base_from_firing
-    report = rehearse(bench, [Segment(0, "strike", "line", strike.ready_joints, nearer)])
+    report = rehearse(bench, [Segment(0, "strike", "line", strike.stand_off_joints, nearer)])
     (refusal,) = report.refusals
     assert {"hammer", "object"} <= set(refusal.bodies[0])
 

@@ -11,7 +11,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import frame_facing
 from harness.basics.mesh import Mesh
-from harness.sim.solid.household.solid_grid import HouseholdSolid
+from harness.sim.solid.household.families import HouseholdSolid
 
 PLACE = 20.0e-3
 """M, deviation per axis of where the object was put."""

@@ -24,8 +24,7 @@ from harness.basics.store import Store, default_folder, digest
 from harness.basics.worker_pool import worker_pool
 from harness.sim.modal.modal import solve_modes
 from harness.sim.modal.modes import dampings
-from harness.sim.solid.household.families import FAMILIES, draw
-from harness.sim.solid.household.solid_grid import HouseholdSolid
+from harness.sim.solid.household.families import FAMILIES, HouseholdSolid, draw
 from harness.sim.solid.tetrahedra import Tetrahedra
 from harness.sim.sound.modal_sound import radiation
 from harness.sim.sound.synthesis import synthesize

@@ -18,7 +18,7 @@ from harness.basics.errors import MeshRefused
 from harness.basics.files.foreign_file import MOST_DATA
 from harness.basics.files.text_file import read_text_bytes
 from harness.sim.solid.formats.cells import CellBlock, CellFile, node_indices
-from harness.sim.solid.text_numbers import MAX_LINE, refuse_number, require_few, show
+from harness.sim.solid.plain_formats import MAX_LINE, refuse_number, require_few, show
 
 _ELEMENTS = {
     "CTETRA": {4: "tetra", 10: "tetra10"},

@@ -11,13 +11,15 @@ import trimesh
 from experiments.shape_reconstruction.methods import estimated
 from experiments.shape_reconstruction.metric import surfaces_apart
 from experiments.shape_reconstruction.prior.network import (
+    PITCH,
     POINTS_GIVEN,
     SIDE,
+    closed_around,
     opened,
+    predict_surface,
     require_silhouette,
     shipped,
 )
-from experiments.shape_reconstruction.prior.surface import PITCH, closed_around, predict_surface
 from experiments.shape_reconstruction.prior.train import main
 from harness.basics.errors import DataRefused, FitRefused
 from harness.basics.faces.mesh_rays import is_inside

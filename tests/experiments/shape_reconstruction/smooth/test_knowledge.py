@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.smooth.contact_samples import all_samples
-from experiments.shape_reconstruction.smooth.knowledge import (
+from experiments.shape_reconstruction.smooth.free_space import (
+    all_samples,
     limited_sides,
     not_bounded,
 )

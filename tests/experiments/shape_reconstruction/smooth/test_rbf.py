@@ -9,8 +9,13 @@ import trimesh
 from experiments.shape_reconstruction.evidence import GuardedTouch
 from experiments.shape_reconstruction.fits import SEEN, TOUCHED, UNOBSERVED, ShapeEstimate
 from experiments.shape_reconstruction.metric import shape_error
-from experiments.shape_reconstruction.smooth.contact_samples import all_samples, thinned
-from experiments.shape_reconstruction.smooth.free_space import CLEARANCE, Silhouette, sensor_depth
+from experiments.shape_reconstruction.smooth.free_space import (
+    CLEARANCE,
+    Silhouette,
+    all_samples,
+    sensor_depth,
+    thinned,
+)
 from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.smooth.revolution import find_revolution
 from harness.basics.arrays import FloatArray

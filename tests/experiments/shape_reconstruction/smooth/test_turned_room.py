@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
-from experiments.shape_reconstruction.smooth.contact_samples import ContactSamples, all_samples
-from experiments.shape_reconstruction.smooth.free_space import sensor_depth
+from experiments.shape_reconstruction.smooth.free_space import ContactSamples, all_samples, sensor_depth
 from experiments.shape_reconstruction.smooth.hermite import fit_rbf
 from experiments.shape_reconstruction.smooth.revolution import SLACK, Revolution, rotated_space
 from harness.basics.arrays import FloatArray

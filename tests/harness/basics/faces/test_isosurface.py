@@ -7,7 +7,7 @@ import trimesh
 from experiments.shape_reconstruction.smooth.grid import isosurface
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import OutOfDomain
-from harness.sim.solid.surface_measure import enclosed_volume
+from harness.sim.solid.walls import enclosed_volume
 
 PITCH = 2.0e-3
 

@@ -14,8 +14,7 @@ from harness.sim.factor.elimination import Elimination, elimination
 from harness.sim.factor.factorisation import Pivots, SparseColumns, factorised, inertia
 from harness.sim.modal.solve import Elasticity
 from harness.sim.modal.system import ModalSystem, modal_system
-from harness.sim.solid.modal_mesh import QuadraticMesh, quadratic_mesh
-from harness.sim.solid.tetrahedra import Tetrahedra
+from harness.sim.solid.tetrahedra import QuadraticMesh, Tetrahedra, quadratic_mesh
 
 
 def scattered(size: int, per_row: float, seed: int) -> SparseColumns:

@@ -14,7 +14,7 @@ from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.builtin import build
 from harness.sim.gel.height_map import RasterMesh, height_maps
 from harness.sim.gel.press_pose import MOST_MOVED, ContactPlace, _nearest, contact_place, gel_from_object
-from harness.sim.solid.surface_measure import nearest_on_surface
+from harness.sim.solid.walls import nearest_on_surface
 
 ANGLES = st.floats(-np.pi, np.pi)
 

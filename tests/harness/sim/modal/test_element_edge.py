@@ -16,8 +16,8 @@ from harness.sim.modal.element_edge import FINE_SHARE, fine_edge, finely_filled,
 from harness.sim.modal.modal import curved
 from harness.sim.modal.solve import solve_mesh
 from harness.sim.solid import filled as filling
-from harness.sim.solid.surface_measure import thin_wall
 from harness.sim.solid.tetrahedra import Tetrahedra
+from harness.sim.solid.walls import thin_wall
 from tests.oracles.ritz_box import ritz_frequencies
 from tests.oracles.volume_meshes import box
 

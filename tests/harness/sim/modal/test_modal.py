@@ -19,8 +19,7 @@ from harness.sim.modal.modal import from_arrays, solve_modes, to_arrays
 from harness.sim.modal.modes import Modes, dampings
 from harness.sim.modal.solve import Elasticity
 from harness.sim.modal.system import modal_system
-from harness.sim.solid.modal_mesh import quadratic_mesh
-from harness.sim.solid.tetrahedra import Tetrahedra, tetrahedra
+from harness.sim.solid.tetrahedra import Tetrahedra, quadratic_mesh, tetrahedra
 from tests.oracles.volume_meshes import ball, box
 
 STEEL = MATERIALS["steel"]

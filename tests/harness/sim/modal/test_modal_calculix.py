@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 from harness.basics.materials import MATERIALS
 from harness.sim.modal.solve import Elasticity, solve_mesh
 from harness.sim.modal.system import MassRule, modal_system
-from harness.sim.solid.modal_mesh import QuadraticMesh, quadratic_mesh
+from harness.sim.solid.tetrahedra import QuadraticMesh, quadratic_mesh
 from tests.oracles.calculix import eigenvalues, needed, run, write_input
 from tests.oracles.exact_solids import exact_ball, exact_box
 

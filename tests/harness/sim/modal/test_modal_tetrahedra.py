@@ -15,9 +15,8 @@ from harness.objects.solid import from_manifold
 from harness.sim.modal.file import modes_of_file
 from harness.sim.modal.modal import default_edge, modes_of, solve_modes
 from harness.sim.solid.mesh_repair import boundary_edges
-from harness.sim.solid.surface_measure import enclosed_volume, nearest_on_surface, thin_wall, wall_thickness
 from harness.sim.solid.tetrahedra import Tetrahedra, tetrahedralize
-from harness.sim.solid.walls import walled
+from harness.sim.solid.walls import enclosed_volume, nearest_on_surface, thin_wall, wall_thickness, walled
 from tests.oracles.volume_meshes import box
 
 CERAMIC = MATERIALS["ceramic"]

@@ -5,7 +5,7 @@ import pytest
 
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh, closed_hull, signed_volume
-from harness.sim.solid.surface_measure import enclosed_volume, thin_wall
+from harness.sim.solid.walls import enclosed_volume, thin_wall
 from tests.oracles.volume_meshes import box
 
 BLOCK = box((0.04, 0.03, 0.02), (2, 2, 2)).surface

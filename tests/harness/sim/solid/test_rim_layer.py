@@ -8,8 +8,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.materials import MATERIALS
 from harness.sim.modal.element_edge import rim_faces, with_rim_layer
 from harness.sim.modal.solve import solve_mesh
-from harness.sim.solid.modal_mesh import quadratic_mesh
-from harness.sim.solid.tetrahedra import Tetrahedra, tetrahedra
+from harness.sim.solid.tetrahedra import Tetrahedra, quadratic_mesh, tetrahedra
 from tests.oracles.exact_solids import exact_box
 from tests.oracles.mapped_cup import cup
 from tests.oracles.ritz_box import ritz_frequencies

@@ -10,9 +10,8 @@ import trimesh
 from harness.basics.errors import MeshRefused
 from harness.bench.scene import scene_from_json
 from harness.effects.scene_object import known_object
-from harness.sim.solid.intake import take_in
+from harness.sim.solid.intake import surface_of, take_in
 from harness.sim.solid.mesh_read import read_mesh
-from harness.sim.solid.surface_source import surface_of
 from harness.sim.solid.volume_mesh import read_volume
 from tests.oracles.volume_meshes import box
 

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from harness.basics.mesh import Mesh
 from harness.objects.solid import from_manifold
-from harness.sim.solid.surface_measure import flat_share
+from harness.sim.solid.walls import flat_share
 
 TURN = Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix()
 

@@ -12,7 +12,7 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.sim.modal.file import modes_of_file
-from harness.sim.solid.modal_mesh import QuadraticMesh, quadratic_mesh
+from harness.sim.solid.tetrahedra import QuadraticMesh, quadratic_mesh
 from harness.sim.solid.volume_mesh import VolumeMesh, read_volume
 from tests.oracles.volume_meshes import box
 
