@@ -57,7 +57,7 @@ gc.set_threshold(50_000, 20, 20)
 
 # One commit gets one verdict; `make hunt` draws other cases every time.
 # A case's duration depends on how busy the machine is; tests/support/cpu_limit.py limits CPU time.
-settings.register_profile("verdict", derandomize=True, deadline=None)
+settings.register_profile("verdict", derandomize=True, deadline=None, max_examples=40)
 settings.register_profile("hunt", derandomize=False, print_blob=True, deadline=None)
 settings.load_profile("verdict")
 

@@ -149,6 +149,8 @@ def read_appearance(
         raise MeshRefused(f"{path.name} has vertices that are not finite numbers; export it again")
     check_extent(vertices, faces, path.name)
     vertices, _ = move_near(vertices, faces, path.name)
+    if not np.ptp(vertices[faces.ravel()], axis=0).any():
+        raise MeshRefused(f"{path.name}: all {len(faces)} faces lie in one point; export it again")
     try:
         return _coloured(Mesh(rotate_upright(vertices, axis) * (metres * scale), faces), read, crease)
     except MemoryError as error:

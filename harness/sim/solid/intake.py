@@ -209,6 +209,8 @@ def _cleaned(raw: RawMesh, name: str) -> RepairedSurface:
         raise MeshRefused(
             f"{name}: {bad} of {len(surface.vertices)} vertices are not finite numbers; export it again"
         )
+    if surface.size == 0.0:
+        raise MeshRefused(f"{name}: all {len(surface.faces)} faces lie in one point; export it again")
     weld(surface)
     a, b, c = surface.faces.T
     drop_faces(surface, (a != b) & (b != c) & (c != a), "collapsed faces")

@@ -113,15 +113,10 @@ def read_mesh(path: Path, up_axis: str | None = None) -> RawMesh:
 
 
 def check_extent(vertices: FloatArray, faces: IntArray, name: str) -> None:
-    """Refuse a single point, and coordinates whose squares and cubes are not numbers.
-
-    Intake refuses coordinates that are not numbers.
-    """
+    """Refuse coordinates whose squares and cubes are no numbers; intake refuses those that are none."""
     low, high = _COORDINATES
     used = vertices[np.unique(faces)]
     finite = used[np.isfinite(used).all(axis=1)]
-    if len(finite) == len(used) and not np.ptp(used, axis=0).any():
-        raise MeshRefused(f"{name}: all {len(faces)} faces lie in one point; export it again")
     largest = float(np.abs(finite).max(initial=0.0))
     if largest > high or 0.0 < largest < low:
         raise MeshRefused(

@@ -1,5 +1,6 @@
 """Gains at any place of a surface: the modes' own, without jumps."""
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -17,22 +18,27 @@ from harness.basics.geometry import rotation_about
 from harness.basics.materials import MATERIALS
 from harness.objects.household import build
 from harness.sim.modal.modes import Modes
-from harness.sim.solid.surface_samples import sample_surface
+from harness.sim.solid.surface_samples import Surface, sample_surface
 from harness.strikes.peaks import Peak, SoundEvidence
 from tests.samples import sounding_plate as plate
 
 ROUND = build("plate")
-SAMPLES = sample_surface(ROUND, 2.0e-3)
 RIM = 106.0e-3
 """Metres from a dinner plate's axis, 4 mm inside of its rim: closer there is more rim than plate."""
+
+
+@functools.cache
+def samples() -> Surface:
+    """The plate's."""
+    return sample_surface(ROUND, 2.0e-3)
 
 
 def _beside(count: int, off: float, seed: int = 0) -> FloatArray:
     """``(count, 3)`` metres, all over the round plate, its rim and foot too, and so far off at most."""
     random = np.random.default_rng(seed)
-    chosen = random.integers(len(SAMPLES.points), size=count)
+    chosen = random.integers(len(samples().points), size=count)
     away = random.uniform(-off, off, (count, 1))
-    return np.asarray(SAMPLES.points[chosen] + away * SAMPLES.normals[chosen])
+    return np.asarray(samples().points[chosen] + away * samples().normals[chosen])
 
 
 def _shapes(rows: IntArray, shares: FloatArray, table: GainTable) -> FloatArray:
@@ -125,11 +131,11 @@ def modes() -> Modes:
 @pytest.fixture(scope="module")
 def table(modes: Modes) -> GainTable:
     """Theirs."""
-    return gain_table(modes, SAMPLES)
+    return gain_table(modes, samples())
 
 
 def test_only_the_two_modes_of_a_wave_about_the_axis_are_a_pair(modes: Modes) -> None:
-    assert find_rotation_pairs(modes, SAMPLES.points).tolist() == [k % 2 == 0 for k in range(15)]
+    assert find_rotation_pairs(modes, samples().points).tolist() == [k % 2 == 0 for k in range(15)]
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.3, 1.0])
@@ -140,7 +146,7 @@ def test_which_modes_are_pairs_does_not_depend_on_the_azimuth_of_their_nodal_lin
     shapes = np.empty_like(modes.shapes)
     shapes[:, 0::2] = np.cos(turn) * cosine + np.sin(turn) * sine
     shapes[:, 1::2] = np.cos(turn) * sine - np.sin(turn) * cosine
-    pairs = find_rotation_pairs(replace(modes, shapes=shapes), SAMPLES.points)
+    pairs = find_rotation_pairs(replace(modes, shapes=shapes), samples().points)
     assert pairs.tolist() == [k % 2 == 0 for k in range(15)]
 
 
@@ -149,7 +155,7 @@ def test_modes_of_a_bar_are_no_pairs(modes: Modes) -> None:
     along = ROUND.vertices[:, 0] / RIM
     waves = np.array([np.cos(n * np.pi * along) for n in range(1, 17)]).T
     bar = replace(modes, shapes=waves[..., None] * np.array([0.0, 0.0, 1.0]))
-    assert not find_rotation_pairs(bar, SAMPLES.points).any()
+    assert not find_rotation_pairs(bar, samples().points).any()
 
 
 def test_turning_a_round_object_under_its_strikes_says_nothing(table: GainTable, modes: Modes) -> None:
