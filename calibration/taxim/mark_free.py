@@ -374,7 +374,6 @@ def check_order(smooth: FloatArray, like: TactileCalibration) -> None:
 
 
 def _wheel(smooth: FloatArray) -> FloatArray:
-    """``(turns, 3)`` grey levels of slopes all around, in the middle of the picture."""
     turns = 2.0 * np.pi * np.arange(_TURNS) / _TURNS
     normals = _SLOPE * np.column_stack([np.cos(turns), np.sin(turns)])
     shown: FloatArray = design(normals, np.zeros((_TURNS, 2))) @ smooth

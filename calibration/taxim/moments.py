@@ -117,7 +117,6 @@ def place_products(where: FloatArray) -> FloatArray:
 
 
 def _count(degree: int) -> int:
-    """Products of two numbers to a total degree."""
     return (degree + 1) * (degree + 2) // 2
 
 
@@ -151,7 +150,6 @@ def _layout(powers: tuple[Power, ...]) -> _Layout:
 
 
 def _rows(exponents: IntArray) -> IntArray:
-    """``_row`` of many, by the last axis."""
     total = exponents.sum(axis=-1)
     rows: IntArray = total * (total + 1) // 2 + exponents[..., 0]
     return rows

@@ -382,7 +382,6 @@ def _write_published(fitted: MarkFree, polycalib: Path | None, shadow_table: Pat
 
 
 def _write_scale(scale: MeasuredScale, aspect: float, artefact: Path) -> None:
-    """Write the scale next to the artefact, whose format has a place for the pitch alone."""
     measured = {"schema": 1, **{name: json_value(value) for name, value in vars(scale).items()}}
     text = dumps({**measured, "made_square_by": aspect}, indent=1, allow_nan=False) + "\n"
     write_text_whole(artefact.with_name(f"{artefact.stem}.scale.json"), text)

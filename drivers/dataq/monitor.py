@@ -130,7 +130,6 @@ class StreamMonitor:
         return nominal - self._earliest
 
     def _allowed(self, time: float) -> float:
-        """Seconds of lateness of a prompt arrival, for what the clock is known to."""
         if self._fit is None:
             return PROMPT + _CRYSTAL * self.clock.span
         unsure = self._even / self._fit.span + _WANDER

@@ -267,7 +267,6 @@ class PortAudioMicrophone:
         return int(np.ceil(seconds * self.form.rate))
 
     def _heard(self) -> int:
-        """How many samples have been handed over since opening."""
         newest = self._blocks.newest()
         return 0 if newest is None else newest.first + self.form.block
 

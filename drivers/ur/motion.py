@@ -183,7 +183,6 @@ class Motion:
         return None
 
     def _error(self, packet: FloatArray) -> tuple[float, float, str]:
-        """(distance from the target, tolerance, unit)."""
         if self.joints is not None:
             off = packet[pipe.FIELDS["joints"]] - np.array(self.joints)
             return float(np.abs(off).max()), JOINT_TOLERANCE, "rad"

@@ -59,19 +59,8 @@ class SafetyLimits:
                 math.isfinite(a) and math.isfinite(b) and a < b for a, b in zip(low, high, strict=True)
             ):
                 raise WrongUse(f"safety limits: the {name} from {low} to {high} is empty or not finite")
-        for name, value in (
-            ("joint_step", self.joint_step),
-            ("joint_speed", self.joint_speed),
-            ("joint_acceleration", self.joint_acceleration),
-            ("speed", self.speed),
-            ("speed_near", self.speed_near),
-            ("near", self.near),
-            ("acceleration", self.acceleration),
-            ("travel", self.travel),
-            ("force_press", self.force_press),
-            ("force_any", self.force_any),
-        ):
-            if not (math.isfinite(value) and value > 0):
+        for name, value in vars(self).items():
+            if isinstance(value, int | float) and not (math.isfinite(value) and value > 0):
                 raise WrongUse(f"safety limits: {name} = {value} must be a positive number")
         if self.speed_near > self.speed:
             raise WrongUse(f"safety limits: speed_near {self.speed_near} m/s is above speed {self.speed} m/s")

@@ -184,7 +184,6 @@ class ScaleAnswering:
         self._count("touch", began)
 
     def _count(self, sense: str, began: float) -> None:
-        """Add the time since ``began`` to the seconds of a sense."""
         self._read[sense] += time.perf_counter() - began
 
     def answer(self) -> SizeAnswer:

@@ -128,7 +128,6 @@ def _doubt(sense: str, one: Said) -> str | None:
 
 
 def _width(belief: Belief) -> float:
-    """Of its nine-tenths interval, in the logarithm."""
     low, high = belief.interval
     return float(np.log(high / low))
 

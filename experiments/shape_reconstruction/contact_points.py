@@ -61,7 +61,6 @@ def contact_points(heights: FloatArray, errors: FloatArray, pitch: float) -> Con
 
 
 def _on_face(shape: tuple[int, ...], rows: IntArray, columns: IntArray, pitch: float) -> FloatArray:
-    """``(n, 3)`` m on the unpressed gel where some pixels of its picture are."""
     across = (columns - 0.5 * (shape[1] - 1)) * pitch
     along = (rows - 0.5 * (shape[0] - 1)) * pitch
     return np.column_stack([across, along, np.zeros(len(rows))])

@@ -163,6 +163,5 @@ def band_held(estimate: ShapeEstimate, apart: SurfacesApart) -> BandHeld:
 
 
 def _deviation(estimate: ShapeEstimate, places: FloatArray, faces: IntArray) -> FloatArray:
-    """``(n,)`` m at ``(n, 3)`` places on faces."""
     shares = shares_on_faces(places, estimate.mesh.corners, faces)
     return np.asarray(np.einsum("ij,ij->i", shares, estimate.deviation[estimate.mesh.faces[faces]]))

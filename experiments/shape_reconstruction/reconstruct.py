@@ -80,7 +80,6 @@ def reconstruct(
 
 
 def _hypotheses_of(previous: ShapeEstimate) -> tuple[Hypothesis, ...]:
-    """Hypotheses of the family in an answer, or those that it was preferred to."""
     fit = previous.rejected if isinstance(previous, SmoothSurface) else previous
     return fit.mixture.hypotheses if isinstance(fit, FamilyFit) else ()
 
@@ -130,7 +129,6 @@ def _continue(
 
 
 def _fit(evidence: ShapeEvidence, settings: FamilySettings, seeds: Sequence[Hypothesis] = ()) -> FamilyFit:
-    """Fit the family once, and compare the surface with the outline."""
     fit = fit_family(evidence, settings, seeds)
     error, free = outline_error(fit.mesh, evidence.look), open_without_class(evidence, fit.mesh)
     return replace(fit, outline_error=error, open_axes=free)

@@ -175,7 +175,6 @@ def _keys_at(model: type[BaseModel], location: Sequence[str | int]) -> list[str]
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:
-    """The model inside an optional or a tuple of models."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     if get_origin(annotation) in (Union, types.UnionType, tuple):

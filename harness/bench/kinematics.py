@@ -313,6 +313,5 @@ def _elbows(
 
 
 def _wrap(angle: float) -> float:
-    """The same angle in (-pi, pi]."""
     wrapped = math.remainder(angle, 2 * math.pi)
     return math.pi if wrapped <= -math.pi else wrapped

@@ -219,7 +219,6 @@ def _shipped(path: Path) -> SensorDescription:
 
 
 def _beside(path: Path, calibration: str | None) -> str | None:
-    """The absolute path of a calibration beside a sensor's file; else the name it is given by."""
     if calibration is None:
         return None
     beside = path.parent / calibration

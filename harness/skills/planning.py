@@ -170,7 +170,6 @@ class Itinerary:
 
     @property
     def _joints(self) -> FloatArray:
-        """``(6,)`` rad, where the arm is after all contacts so far."""
         if not self.contacts:
             return self._start
         struck = len(self.strikes) == len(self.contacts)

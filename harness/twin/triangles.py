@@ -99,7 +99,6 @@ class Solid:
 
 
 def _moved(planes_in_a: FloatArray, b_from_a: FloatArray) -> FloatArray:
-    """``(n, 4)`` planes of frame a, in frame b."""
     moved: FloatArray = planes_in_a @ inverse(b_from_a)
     return moved
 

@@ -201,7 +201,6 @@ class MjpegServer:
             client.sendall(head % (len(frame), time.time()) + frame + b"\r\n--" + BOUNDARY + b"\r\n")
 
     def _next(self, last: int) -> tuple[bytes, int]:
-        """The newest frame and its number, once there is a newer one than ``last``."""
         with self._changed:
             while self._number <= last and not self._stopped:
                 self._changed.wait(1.0)

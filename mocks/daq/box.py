@@ -253,7 +253,6 @@ class DaqBox:
 
     @property
     def _scan_rate(self) -> float:
-        """Scans a second that leave."""
         scans = self._speed * self._instrument.aggregate_rate / len(self._instrument.scan_list)
         return scans / self._instrument.decimation
 
@@ -330,7 +329,6 @@ class DaqBox:
         return True
 
     def _deliver(self) -> None:
-        """Write to the program at the other end what it takes."""
         with contextlib.suppress(BlockingIOError):
             while self._host:
                 del self._host[: os.write(self._master, self._host[:_WRITE])]

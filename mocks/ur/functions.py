@@ -149,7 +149,6 @@ class Functions:
         return poses.compose(flange, self._mover.flange_from_tcp)
 
     def _solved(self, base_from_tcp: Matrix, flange_from_tcp: Matrix, near: Six) -> Six:
-        """Joints nearest to ``near``; the program stops where there are none."""
         flange = poses.compose(base_from_tcp, poses.inverse(flange_from_tcp))
         found = kinematics.postures(self._robot.arm, flange, near)
         if not found:

@@ -171,7 +171,6 @@ class SoundDraw:
 
 
 def _polar(levels: FloatArray, phases: FloatArray) -> ComplexArray:
-    """Complex gains of levels in dB and phases in rad."""
     gains: ComplexArray = 10.0 ** (levels / 20.0) * np.exp(1j * phases)
     return gains
 

@@ -275,7 +275,6 @@ class World:
         return np.clip(np.rint(seen + noise), 0, 255).astype(np.uint8) if noise.any() else seen
 
     def _hidden(self) -> Mapping[str, Any]:
-        """The size, of an object whose size nobody is told."""
         if self._bench.made_scale is None:
             return {}
         longest = float(np.ptp(self.mesh.bounds, axis=0).max())
@@ -307,7 +306,6 @@ class World:
         return SceneView(base_from_camera, camera.rows, camera.columns, focal, fixed)
 
     def _placed(self) -> FloatArray:
-        """``base_from_object``: turned and moved about the middle of the object."""
         middle = apply(self._bench.base_from_object, self.nominal.bounds.mean(axis=0)[None])[0]
         run = self._draw.run
         moved = translation(middle + run.position) @ transform(run.object_rotation, np.zeros(3))
@@ -351,7 +349,6 @@ class World:
         return Met(point, self._nominal_point(face, point))
 
     def _nominal_point(self, face: int, point: FloatArray) -> FloatArray:
-        """Where a material point of a true face is on the nominal surface."""
         nominal: FloatArray = plane_shares(self.mesh.corners[face], point) @ self.nominal.corners[face]
         return nominal
 

@@ -193,7 +193,6 @@ class BallPresses:
         return seen, way
 
     def _to(self, bench: Bench, motion: PressMotion, down: float, speed: float) -> None:
-        """To ``down`` m from the stand-off along the axis."""
         pose = motion.base_from_stand_off.copy()
         pose[:3, 3] += down * motion.axis
         bench.arm.move_line(pose, speed, _ACCELERATION)

@@ -333,7 +333,6 @@ def noise_at(errors: BenchErrors) -> Noise:
 
 
 def _ratio(errors: BenchErrors, *names: str) -> float:
-    """Of errors that add in squares, over the usual ones."""
     ours, usual = (np.linalg.norm([getattr(some, name) for name in names]) for some in (errors, USUAL))
     return float(ours / usual)
 

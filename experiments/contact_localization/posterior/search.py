@@ -194,7 +194,6 @@ class Search:
         return term
 
     def _scales(self, members: IntArray, named: bool = False) -> Iterator[tuple[int, float, float]]:
-        """Contact, sigma of its place and temperature of its image."""
         per_metre = self.geometry.gap_per_metre
         return contact_scales(self.positions, self.axes, members, self.noise, per_metre, named)
 

@@ -191,6 +191,5 @@ def _matches(
 
 
 def _mixed(matches: Sequence[Match], beliefs: Sequence[Belief]) -> Belief:
-    """Beliefs of the matches, each weighed by its material's evidence."""
     weighed = [one.log_evidence + belief.log_density for one, belief in zip(matches, beliefs, strict=True)]
     return Belief.of(beliefs[0].range, np.logaddexp.reduce(weighed, axis=0))

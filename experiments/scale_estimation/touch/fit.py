@@ -329,7 +329,6 @@ class TouchProblem:
 
 
 def _turns(unknowns: FloatArray) -> FloatArray:
-    """``(k, 3, 3)`` rotations about the vertical."""
     cosine, sine = np.cos(unknowns[:, _YAW]), np.sin(unknowns[:, _YAW])
     turn = np.zeros((len(unknowns), 3, 3))
     turn[:, 0, 0] = turn[:, 1, 1] = cosine

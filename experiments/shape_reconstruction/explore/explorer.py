@@ -279,7 +279,6 @@ class ShapeExplorer:
         self._read = index
 
     def _towards_surface(self, estimate: ShapeEstimate | None, random: np.random.Generator) -> FloatArray:
-        """``(n, 4, 4)`` in ``stand``."""
         if estimate is None:
             return np.zeros((0, 4, 4))
         return lines_at_surface(estimate, self._run.station.gel.sensor, DRAWN, random)

@@ -151,7 +151,6 @@ def _stacked(parts: list[FloatArray], columns: int) -> FloatArray:
 
 
 def _numbered(parts: list[FloatArray]) -> IntArray:
-    """``(rows,)`` of which part each of their rows is."""
     return np.repeat(np.arange(len(parts)), [len(rows) for rows in parts]).astype(np.int64)
 
 

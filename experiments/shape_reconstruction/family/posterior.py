@@ -64,7 +64,6 @@ class Mixture:
 
 
 def _padded(theta: FloatArray) -> list[float]:
-    """The numbers of a vector in the result, as many for every kind."""
     return [*theta.tolist(), *[0.0] * (VECTOR_SIZE - len(theta))]
 
 

@@ -104,7 +104,6 @@ def _mug(random: Random, code: IntArray, theta: FloatArray) -> None:
 
 
 def _dish(random: Random, radius: float, foot: float) -> tuple[FloatArray, FloatArray]:
-    """Sample radii, and relative heights, along a curve that leaves the foot outward."""
     turn = 0.5 * np.pi * _EVEN * random.uniform(0.5, 1.0)
     out, up = np.sin(turn) / np.sin(turn[-1]), (1.0 - np.cos(turn)) / (1.0 - np.cos(turn[-1]))
     return radius * (foot + (1.0 - foot) * out), up
@@ -183,7 +182,6 @@ def _teapot(random: Random, code: IntArray, theta: FloatArray) -> None:
 
 
 def _any_round(random: Random) -> tuple[float, FloatArray]:
-    """A height and radii that wander."""
     height, radius = sample_length(random, 40.0, 260.0), sample_length(random, 20.0, 85.0)
     steps = np.cumsum(np.cumsum(random.normal(0.0, 0.12, KNOTS)) * 0.7 + random.normal(0.0, 0.06, KNOTS))
     return height, radius * np.exp(steps - steps.max())
@@ -379,7 +377,6 @@ class BodyOfRevolution(ShapeKind):
 
 
 def _add_limb(shape: FamilyShape, random: Random) -> FamilyShape:
-    """Sample a handle and add it to a body."""
     code, theta = shape.code.copy(), shape.theta.copy()
     _loop(random, code, theta, float(np.exp(theta[SLOT.height])))
     return FamilyShape(shape.name, code, theta)

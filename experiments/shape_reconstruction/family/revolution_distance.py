@@ -268,7 +268,6 @@ def _from_section(q: FloatArray, rho: float, z: float, stretch: float, level: fl
 
 @compiled
 def _from_piece(q: FloatArray, i: int, rho: float, z: float) -> tuple[float, float]:
-    """From the nearest place of a straight piece of the side, in radius and height."""
     er, ez = q[_R + i + 1] - q[_R + i], q[_Z + i + 1] - q[_Z + i]
     pr, pz = rho - q[_R + i], z - q[_Z + i]
     share = min(max((pr * er + pz * ez) * q[_INVERSE + i], 0.0), 1.0)

@@ -159,7 +159,6 @@ class FamilySearch:
     # Stage 2: place them by the readings.
 
     def _place(self, proposed: Iterable[tuple[list[FamilyShape], Random]]) -> list[Hypothesis]:
-        """Fit position, yaw and size of samples; keep those of each combination of parts that fit best."""
         return [one for shapes, random in proposed for one in self._place_alike(shapes, random)]
 
     def _place_alike(self, shapes: list[FamilyShape], random: Random) -> list[Hypothesis]:
@@ -214,7 +213,6 @@ class FamilySearch:
     # Stage 4: vary parts, then all parameters.
 
     def _change_parts(self, refined: list[Hypothesis], random: Random) -> list[Hypothesis]:
-        """Add hypotheses that differ from the best by one or two parts."""
         count = self.settings.changed
         changed = self._changes_of_best(refined, count, random)
         # What one change made better may need another: a wall that was fitted as solid is hollow again.
@@ -262,7 +260,6 @@ class FamilySearch:
     # Stage 5: finish a few hypotheses.
 
     def _finish(self, changed: list[Hypothesis], varied: list[Hypothesis]) -> list[Hypothesis]:
-        """Refine distinct hypotheses to the end, with their curvature."""
         # Perturbed copies of the best must not replace what is likely elsewhere.
         last = _distinct([*_distinct(varied, PERTURBED), *changed], self.settings.finals + PERTURBED)
         return _ranked(self.refine(one, self.settings.finishing, last=True) for one in last)

@@ -107,7 +107,6 @@ def tool_distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: floa
 
 @compiled
 def _thick(flat: float, up: float) -> float:
-    """A plane distance made thick."""
     if flat > 0.0 and up > 0.0:
         return float(np.sqrt(flat * flat + up * up))
     return max(flat, up)

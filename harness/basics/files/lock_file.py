@@ -135,7 +135,6 @@ def _lock(descriptor: int) -> bool:
 
 
 def _has_name(path: Path, descriptor: int) -> bool:
-    """Check that a path still leads to an open file."""
     try:
         return os.path.samestat(path.stat(follow_symlinks=False), os.fstat(descriptor))
     except FileNotFoundError:

@@ -37,7 +37,6 @@ USB_CAMERA = (
 
 
 def _require_http(url: str | None) -> str | None:
-    """Return the address of a stream, or refuse one that no HTTP camera has."""
     if url is not None and not url.startswith(("http://", "https://")):
         raise ValueError(f"{url!r} is not the address of a stream (http://...); {USB_CAMERA}")
     return url

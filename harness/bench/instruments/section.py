@@ -91,7 +91,6 @@ class Placement(StrictModel):
 
 
 def _beside_station(named: str, info: ValidationInfo) -> str:
-    """Return the absolute path of a file next to the station file, or the given name."""
     folder: Path | None = (info.context or {}).get("folder")
     return str(real_path(folder / named)) if folder is not None and (folder / named).exists() else named
 

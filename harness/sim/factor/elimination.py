@@ -253,6 +253,5 @@ def _structure(
 
 
 def _runs(begins: IntArray, lengths: IntArray) -> IntArray:
-    """Each beginning followed by the numbers after it, as many as its length."""
     shift: IntArray = begins - (np.cumsum(lengths) - lengths)
     return np.arange(int(lengths.sum())) + np.repeat(shift, lengths)

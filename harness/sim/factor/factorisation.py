@@ -120,7 +120,6 @@ def inertia(matrix: SparseColumns, plan: Elimination) -> Pivots | None:
 
 
 def _places(plan: Elimination) -> IntArray:
-    """Where each panel begins."""
     return np.concatenate([[0], np.cumsum(plan.widths * (plan.widths + plan.heights))])
 
 
@@ -177,7 +176,6 @@ def _deepest(plan: Elimination) -> int:
 
 @compiled
 def _group(left: int) -> int:
-    """Columns taken at once of those that are left."""
     if left >= 8:
         return 8
     return 4 if left >= 4 else 1
@@ -295,7 +293,6 @@ def _at(builder: Any, place: Any, offset: Any, kind: Any) -> Any:
 
 
 def _vector(builder: Any, place: Any, row: Any) -> Any:
-    """Address of the eight numbers of a row."""
     return _at(builder, place, builder.mul(row, ir.Constant(ir.IntType(64), EIGHT)), _VECTOR)
 
 

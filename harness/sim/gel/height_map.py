@@ -421,7 +421,6 @@ def _columns(i: int, columns: int, of: Corners, steps: Steps) -> tuple[int, int]
 def _reach(
     i: int, x0: float, y0: float, x1: float, y1: float, step: float, left: float, right: float
 ) -> tuple[float, float]:
-    """The columns from ``left`` to ``right``, widened to those in which a row meets an edge."""
     if y1 - y0 <= ON_EDGE:
         return min(left, x0, x1), max(right, x0, x1)
     x = x0 + (i - y0) * step

@@ -160,7 +160,6 @@ def read_appearance(
 
 
 def _metres(units: str, declared: float | None) -> float:
-    """Metres in a unit that is named, or declared by the file."""
     if declared is not None and units == unit_name(declared):
         return declared
     if units not in METRES:

@@ -175,7 +175,6 @@ def gathered(seen: VisibleSurface, falling: FloatArray, clock: _Clock | None = N
 
 
 def _summed(seen: VisibleSurface, values: FloatArray) -> FloatArray:
-    """``(4, rows, columns, channels)`` sums of the samples' ``(n, channels)``, by quarters."""
     camera = seen.camera
     at = seen.quarter * camera.pixels + seen.pixel
     sums = [np.bincount(at, values[:, k], QUARTERS * camera.pixels) for k in range(values.shape[1])]

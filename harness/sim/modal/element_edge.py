@@ -214,12 +214,10 @@ def _bent(
 
 
 def _affordable(volume: float, unknowns: float) -> float:
-    """Metres of an edge with which filling ``volume`` makes about so many unknowns."""
     return float(np.cbrt(_UNKNOWNS * volume / unknowns))
 
 
 def _shear_speed(material: Material) -> float:
-    """Metres in a second."""
     return float(np.sqrt(material.young / (2.0 * (1.0 + material.poisson) * material.density)))
 
 

@@ -303,7 +303,6 @@ def straightened(mesh: QuadraticMesh) -> QuadraticMesh:
 
 
 def _with_middles(mesh: QuadraticMesh, nodes: FloatArray, corners: int) -> QuadraticMesh:
-    """Straight cells on moved corners."""
     moved = nodes.copy()
     moved[corners:] = middles_of(nodes, mesh.cells, len(nodes))[corners:]
     return QuadraticMesh(moved, mesh.cells, mesh.faces)

@@ -99,7 +99,6 @@ class _Lanczos:
             current = step
 
     def _append(self, current: FloatArray) -> None:
-        """Take a block into the basis, which doubles when it is full."""
         end = self.used + current.shape[1]
         if end > self.basis.shape[1]:
             self._reserve(2 * self.basis.shape[1])
@@ -148,7 +147,6 @@ class _Lanczos:
         return block - known @ share - self.system.rigid @ rigid, share
 
     def _cleared(self, block: FloatArray) -> FloatArray:
-        """Without rigid motion and without what the basis already holds."""
         for _ in range(2):
             block, _ = self._without(block, self.system.weighted(block))
         return block

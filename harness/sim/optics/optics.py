@@ -103,7 +103,6 @@ class Optics:
         return TactileImages(read_only(images), read_only(counts[:, 0]), read_only(counts[:, 1]))
 
     def _surface(self, pressed: FloatArray) -> FloatArray:
-        """``(rows, columns)`` the gel's height in pixels, on the grid."""
         surface = np.empty(self._rest.shape)
         to_pixels(self._rest, pressed, 1.0 / self.calibration.header.pitch, surface)
         return surface

@@ -223,12 +223,10 @@ def _together(counts: IntArray) -> list[slice]:
 
 
 def _width(modes: int) -> int:
-    """Columns of a table."""
     return 2 * TILE * -(-modes // TILE)
 
 
 def _in_tiles(values: AnyArray) -> FloatArray:
-    """``(2, TILE tiles)`` real and imaginary parts, zero beyond the values."""
     parts = np.zeros((2, _width(len(values)) // 2))
     parts[0, : len(values)], parts[1, : len(values)] = values.real, values.imag
     return parts
@@ -314,7 +312,6 @@ def _stretch(samples: int) -> int:
 
 
 def _passed(dampings: FloatArray, turns: FloatArray, rate: float, samples: int) -> AnyArray:
-    """``(m,)`` complex factor of some samples; the phase loses no whole turns to rounding."""
     angle = samples * turns
     return np.asarray(np.exp(-dampings * (samples / rate) + 2j * np.pi * (angle - np.rint(angle))))
 

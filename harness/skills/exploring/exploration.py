@@ -117,7 +117,6 @@ class Exploration:
             yield step
 
     def _skipped_last(self, recording: Recording) -> int:
-        """Return how many steps at the end of a recording were left out."""
         for count in range(recording.committed):
             if recording.step(recording.committed - 1 - count).step.kind != SKIPPED:
                 return count

@@ -127,7 +127,6 @@ def _cone(stand: UnknownStand, outline: SeenOutline) -> FloatArray:
 
 
 def _centre(camera: CameraSection) -> FloatArray:
-    """``(2,)`` pixels, where the optical axis meets the picture."""
     return np.array([0.5 * camera.columns, 0.5 * camera.rows])
 
 
@@ -231,7 +230,6 @@ def around(places: FloatArray, off: float, margin: float, support: float) -> Mes
 
 
 def _sum(places: FloatArray, shifts: FloatArray) -> FloatArray:
-    """``(n, 3)`` every one of the places, shifted by every one of the shifts."""
     return np.asarray((places[:, None] + shifts).reshape(-1, 3))
 
 

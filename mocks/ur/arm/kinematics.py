@@ -115,7 +115,6 @@ def _distance(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def _nearest_turn(angle: float, near: float) -> float:
-    """The same direction, within half a turn of ``near``."""
     return near + math.remainder(angle - near, TURN)
 
 

@@ -379,7 +379,6 @@ class _Translator:
         return items
 
     def _call(self, word: Token) -> ast.expr:
-        """A call, after the function's name."""
         if word.text in self._own:
             return _steps(_call(f"function {word.text}", word.line, self._entered("enter", word)))
         function = self._builtins.get(word.text)
@@ -395,7 +394,6 @@ class _Translator:
         return _steps(call) if inspect.isgeneratorfunction(function) else call
 
     def _run(self, word: Token) -> ast.expr:
-        """``run name(arguments)``, after its first word."""
         name = self._words.next
         if self._words.name() not in self._own:
             raise ScriptError(f"there is no thread '{name.text}'", word.line)
@@ -434,23 +432,19 @@ _Node = TypeVar("_Node", ast.Call, ast.YieldFrom, ast.Break, ast.Continue)
 
 
 def _call(name: str, line: int, *given: ast.expr) -> ast.Call:
-    """``name(given)``."""
     return _placed(ast.Call(ast.Name(name, ast.Load()), list(given), []), line)
 
 
 def _of_frame(method: str, line: int, *given: ast.expr) -> ast.Call:
-    """A call of a method of the ``CallFrame``."""
     attribute = ast.Attribute(ast.Name("frame", ast.Load()), method, ast.Load())
     return _placed(ast.Call(attribute, list(given), []), line)
 
 
 def _steps(call: ast.Call) -> ast.YieldFrom:
-    """The result of a call that may take time."""
     return _placed(ast.YieldFrom(call), call.lineno)
 
 
 def _placed(node: _Node, line: int) -> _Node:
-    """The node, on a line."""
     node.lineno = node.end_lineno = line
     node.col_offset = node.end_col_offset = 0
     return node

@@ -455,13 +455,11 @@ _LINKS = ("source", "init_from", "instance_image")
 
 
 def _name(element: Any) -> str:
-    """An element's name without its namespace; of a comment, nothing."""
     tag = element.tag
     return tag.rpartition("}")[2] if isinstance(tag, str) else ""
 
 
 def _child(element: Any, name: str) -> Any:
-    """An element's first child of that name; None where there is none."""
     return None if element is None else next((each for each in element if _name(each) == name), None)
 
 
@@ -479,13 +477,11 @@ def _set_of(binding: Any, coordinates: str, there: dict[int, FloatArray]) -> int
 
 
 def _strip(corners: IntArray) -> IntArray:
-    """The corners of a strip's triangles, one after the other."""
     triangles = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
     triangles[1::2] = triangles[1::2, [1, 0, 2]]
     return triangles.reshape(-1, corners.shape[1])
 
 
 def _fan(corners: IntArray) -> IntArray:
-    """The corners of a fan's triangles, one after the other."""
     first = np.repeat(corners[:1], max(len(corners) - 2, 0), axis=0)
     return np.stack([first, corners[1:-1], corners[2:]], axis=1).reshape(-1, corners.shape[1])

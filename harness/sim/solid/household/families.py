@@ -111,7 +111,6 @@ def draw(family: str, random: _Random) -> HouseholdSolid:
 
 
 def _wall(random: _Random, least: float = 0.03, most: float = 0.12) -> float:
-    """Of a vessel's radius; as many thin as thick."""
     return float(np.exp(random.uniform(np.log(least), np.log(most))))
 
 
@@ -315,7 +314,6 @@ def _divided(outer: FloatArray, inner: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def _ring(grid: SolidGrid, line: FloatArray, way: FloatArray) -> IntArray:
-    """``(s, AROUND)`` nodes; on the axis all around are one."""
     flat = line[:, None, :1] * way[None]
     height = np.broadcast_to(line[:, None, 1:], (*flat.shape[:2], 1))
     numbers = grid.add_nodes(np.concatenate([flat, height], axis=2))
@@ -324,7 +322,6 @@ def _ring(grid: SolidGrid, line: FloatArray, way: FloatArray) -> IntArray:
 
 
 def _row_at(vessel: Vessel, height: float) -> int:
-    """Of the outer face, the row below which a tube of two cells begins."""
     heights = vessel.grid.places(vessel.outside[:, 0])[:, 2]
     return int(np.clip(np.abs(heights - height).argmin() - 1, 1, len(heights) - 3))
 
