@@ -90,16 +90,8 @@ class CameraView:
         self._shared.set_shown(self._viewer, self._mark.number)
 
 
-def stream(address: str, port: int, view: CameraView, rate: float, line: ChildPipe) -> None:
-    """Serve a view as MJPEG until the lab is gone.
-
-    Args:
-        address: loopback.
-        port: of the stream.
-        view: what is to be seen.
-        rate: frames a second.
-        line: to the lab.
-    """
+def _stream(address: str, port: int, view: CameraView, rate: float, line: ChildPipe) -> None:
+    """Serve a view as MJPEG until the lab is gone."""
     server = MjpegServer(address, port, view, rate)
     line.ready()
 
@@ -162,7 +154,7 @@ def start_camera(name: str, lab: LabBench) -> FarEnd:
 
 def _start_stream(name: str, address: str, port: int, view: CameraView, rate: float) -> FarEnd:
     url = f"http://{address}:{port}/?action=stream"
-    return LabChild(name, lambda line: stream(address, port, view, rate, line), url, CAMERA_FAULTS)
+    return LabChild(name, lambda line: _stream(address, port, view, rate, line), url, CAMERA_FAULTS)
 
 
 def start_hammer(name: str, lab: LabBench) -> FarEnd:

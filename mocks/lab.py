@@ -173,7 +173,10 @@ class Lab:
                 case {"mark": {"step": int(step), "sample": int(sample)}} if len(request) == 1:
                     return {"marked": self._mark(step, sample)}
                 case {"fault": dict(cue)} if len(request) == 1:
-                    return {"begun": self._cue(cue)}
+                    ends = self._bench.ends
+                    fault = parse(cue, {name: end.faults for name, end in ends.items()})
+                    ends[fault.instrument].cue(fault)
+                    return {"begun": dict(cue)}
         except json.JSONDecodeError as error:
             return {"error": f"not a line of JSON: {error}"}
         except TouchstoneError as error:
@@ -198,12 +201,6 @@ class Lab:
         while self._shared.shown(viewer) < mark.number and now() < end:
             time.sleep(2e-3)
         return {"step": step, "sample": sample}
-
-    def _cue(self, cue: Mapping[str, object]) -> Mapping[str, object]:
-        ends = self._bench.ends
-        fault = parse(cue, {name: end.faults for name, end in ends.items()})
-        ends[fault.instrument].cue(fault)
-        return dict(cue)
 
 
 def _lines(descriptor: int, orphaned: Callable[[], bool]) -> Iterator[str]:
@@ -259,7 +256,8 @@ def _begin(arguments: argparse.Namespace) -> Lab:
     return Lab(bench, TruthFile(arguments.truth, world, arguments.seed, arguments.run, sound))
 
 
-def _parser() -> argparse.ArgumentParser:
+def main() -> int:
+    """Run the lab until standard input ends; the exit status."""
     parser = argparse.ArgumentParser(prog="python -m mocks.lab", description="The mocked bench.")
     parser.add_argument("--scene", type=Path, required=True, help="the bench, as JSON")
     parser.add_argument("--seed", type=int, required=True, help="of the run, zero or more")
@@ -268,12 +266,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--run", default="", help="identity of the run, which the truth repeats")
     parser.add_argument("--truth", type=Path, required=True, help="where to write what really happened")
-    return parser
-
-
-def main() -> int:
-    """Run the lab until standard input ends; the exit status."""
-    arguments = _parser().parse_args()
+    arguments = parser.parse_args()
     parent = os.getppid()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the run's to answer; it closes our input
     try:

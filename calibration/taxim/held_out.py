@@ -1,6 +1,6 @@
 """How well presses are predicted that a calibration has never seen: eight folds, press by press.
 
-``contact_circle`` finds the contact line of a ball in all presses at once. Laid over one another by their
+``_contact_circle`` finds the contact line of a ball in all presses at once. Laid over one another by their
 centres, the presses show one sharp line: along every ray from the centre the change of colour grows with the
 slope up to where the gel leaves the ball, and fades from there. A circle through those places says where the
 ball's axis is, whatever the lights do, and how large the contact is.
@@ -119,7 +119,7 @@ def teach(pack: PressPack, change: FloatArray, ball: float) -> FittedModel:
     clean = change - rest
     slopes_alone, _ = aligned(pack, clean, ball, PLAIN)
     loose, _ = aligned(replace(pack, centres=slopes_alone), clean, ball, WITH_OFFSET)
-    circle = contact_circle(clean, loose, ball)
+    circle = _contact_circle(clean, loose, ball)
     fit = settled(pack, clean, loose + circle.shift, circle.radius, ball, WITH_OFFSET)
     plain = settled(pack, clean, slopes_alone, circle.radius, ball, PLAIN)
     table, support = fit_table(pack, fit, ball, clean)
@@ -203,13 +203,8 @@ def _table_residual(
     return place, table_shades(table, centre, place, ball) - change[place[:, 0], place[:, 1]]
 
 
-def contact_circle(change: FloatArray, centres: FloatArray, ball: float) -> ContactCircle:
-    """The circle through the places of strongest change.
-
-    Args:
-        change: ``(presses, rows, columns, 3)`` grey levels against the untouched gel.
-        centres: ``(presses, 2)`` pixels (column, row), right but for a shift of all together.
-        ball: radius in pixels.
+def _contact_circle(change: FloatArray, centres: FloatArray, ball: float) -> ContactCircle:
+    """Fit the circle through the strongest change; its centres are off by one shift of all presses.
 
     Raises:
         CalibrationRefused: the line is no smaller than the ball.

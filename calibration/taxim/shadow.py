@@ -378,7 +378,7 @@ def _press(
     table = fit.in_metres(pitch)
     if table is None:
         return None
-    drawn, taken = shaded_press(pack, centre, light, table, pitch, ball)
+    drawn, taken = _shaded_press(pack, centre, light, table, pitch, ball)
     own = taken.max(axis=-1) >= OWN
     if own.sum() < LEAST_PIXELS:
         return None
@@ -386,19 +386,10 @@ def _press(
     return decibels(left - taken[own]), decibels(left), int(own.sum())
 
 
-def shaded_press(
+def _shaded_press(
     pack: PressPack, centre: FloatArray, light: GelLight, table: ShadowTable, pitch: float, ball: float
 ) -> tuple[FloatArray, FloatArray]:
-    """A press without its shadows, and what they take from it: ``(rows, columns, 3)`` grey levels each.
-
-    Args:
-        pack: gives the size of the picture.
-        centre: pixels (column, row).
-        light: slopes, skirt and light.
-        table: with depths in metres.
-        pitch: metres a pixel.
-        ball: radius in pixels.
-    """
+    """Draw a press without its shadows, and what they take from it, grey levels each."""
     away = distance(pack.shape, centre)
     place = np.argwhere(away < REACH * light.edge)
     change = np.zeros((*pack.shape, 3))

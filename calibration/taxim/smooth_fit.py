@@ -80,12 +80,8 @@ def changes(pack: PressPack) -> FloatArray:
     return change
 
 
-def ball_edge(change: FloatArray, centres: FloatArray, ball: float) -> float:
-    """The radius in pixels where the gel is steepest: the ball's contact line, mean over the presses.
-
-    Raises:
-        CalibrationRefused: it is not inside the ball.
-    """
+def _ball_edge(change: FloatArray, centres: FloatArray, ball: float) -> float:
+    """Return the radius in pixels where the gel is steepest, mean over the presses; it is inside the ball."""
     profile = [strength_by_radius(change[k], centres[k], ball) for k in range(len(change))]
     edge = float(np.argmax(np.median(profile, axis=0))) + 0.5
     if not 3.0 <= edge < ball:
@@ -122,14 +118,14 @@ def aligned(pack: PressPack, change: FloatArray, ball: float, manner: Manner) ->
         CalibrationRefused: the presses contradict the ball.
     """
     centres = pack.centres.copy()
-    edge = ball_edge(change, centres, ball)
+    edge = _ball_edge(change, centres, ball)
     for turn in range(manner.rounds):
         colours, _ = coefficients(pack, change, centres, edge, ball, manner)
         centres = np.stack(
             [refined_centre(pack, change[k], centres[k], colours, edge, ball) for k in range(len(centres))]
         )
         if manner.edge_again and turn == manner.rounds // 2:
-            edge = ball_edge(change, centres, ball)
+            edge = _ball_edge(change, centres, ball)
     return centres, edge
 
 

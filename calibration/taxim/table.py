@@ -71,7 +71,7 @@ def fit_table(
         change: ``(presses, rows, columns, 3)`` grey levels against the untouched gel.
     """
     rows, columns = pack.shape
-    by_place = np.tensordot(bin_terms(fit.edge, ball), by_group(fit.colours), axes=1)  # (bins^2, 6, 3)
+    by_place = np.tensordot(_bin_terms(fit.edge, ball), by_group(fit.colours), axes=1)  # (bins^2, 6, 3)
     # Both are all the quadratics of the place: nine places give the one from the other exactly.
     x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0, columns - 1, 3), np.linspace(0, rows - 1, 3)))
     raw = np.stack([x * x, y * y, x * y, x, y, np.ones_like(x)], axis=1)
@@ -111,13 +111,8 @@ def _bins_of_ball(right: FloatArray, down: FloatArray, ball: float) -> tuple[Int
     return bin_of(np.arcsin(np.hypot(right, down) / ball), np.arctan2(-down, -right), BINS)
 
 
-def bin_terms(edge: float, ball: float) -> FloatArray:
-    """``(120 * 120, 21)`` what bins have of each group of the smooth model: 20 of slopes, and the offset.
-
-    Args:
-        edge: pixels, of the contact line; steeper bins have its slope.
-        ball: radius in pixels.
-    """
+def _bin_terms(edge: float, ball: float) -> FloatArray:
+    """Return each bin's terms in the groups of the smooth model: 20 of slopes, and the offset."""
     step = 0.5 * np.pi / (BINS - 1)
     magnitude, direction = np.meshgrid(
         (np.arange(BINS) + 0.5) * step, -np.pi + (np.arange(BINS) + 0.5) * 4.0 * step, indexing="ij"
@@ -189,7 +184,7 @@ def _left_out(
     total = np.array([left.reshape(-1, 3) for left, _ in presses])
     x, y = fit.centres.T
     where = place_terms(scaled_position(x, y, *pack.shape))
-    terms = bin_terms(fit.edge, ball)
+    terms = _bin_terms(fit.edge, ball)
     own = total.sum(axis=0) / (count.sum(axis=0) + SHRINK)[:, None]
     variance = np.zeros_like(own)
     for k, change in enumerate(_changes_without(pack, clean, fit, ball)):

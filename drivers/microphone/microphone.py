@@ -107,7 +107,7 @@ class PortAudioMicrophone:
         if self._stream is not None:
             return
         WATCH.start()
-        library = acquire()
+        library = _acquire()
         try:
             self._stream = self._begin(library)
         except BaseException:
@@ -211,7 +211,7 @@ class PortAudioMicrophone:
 
     def _begin(self, library: Any) -> Any:
         """The stream, running."""
-        found = find_input(library, self._device, self.form.channels)
+        found = _find_input(library, self._device, self.form.channels)
         self._blocks = self._empty()
         self._next, self._opened = 0, now()
         kind = {
@@ -320,14 +320,11 @@ _lock = threading.Lock()
 _users = 0
 
 
-def acquire() -> Any:
-    """The ``sounddevice`` module, with the list of devices as it is now; `release` it after use.
+def _acquire() -> Any:
+    """Return the ``sounddevice`` module with the present devices; ``release`` it after use.
 
     PortAudio lists devices when it starts, and a microphone may have been plugged in since:
     it is started again unless this process is using it.
-
-    Raises:
-        BenchFault: sounddevice or the PortAudio library is not installed.
     """
     global _users
     with _lock:
@@ -368,7 +365,7 @@ def _load() -> Any:
     return sounddevice
 
 
-def find_input(library: Any, device: str, channels: int) -> dict[str, Any]:
+def _find_input(library: Any, device: str, channels: int) -> dict[str, Any]:
     """The one input device of that name, which must have just so many channels.
 
     A device is named as PortAudio names it, or by its name, a comma, a space and its host API

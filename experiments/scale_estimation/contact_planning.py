@@ -256,27 +256,20 @@ def blind_envelope(model: ObjectModel) -> Mesh:
     stands = [np.array([np.log(size / model.nominal), 0.0, 0.0, yaw]) for yaw in turns]
     reach = float(np.linalg.norm(model.corners[:, :2], axis=1).max()) * size / model.nominal
     between = reach * (1.0 / np.cos(np.pi / _YAWS) - 1.0)
-    return envelope(model, stands, PLACES * model.place_error + between, margin_of(size))
+    return _envelope(model, stands, PLACES * model.place_error + between, margin_of(size))
 
 
 def seen_envelope(model: ObjectModel, stands: Sequence[SeenStand]) -> Mesh:
     """Where it may be after a look, in every turn that was not ruled out; in base."""
     largest = model.nominal * float(np.exp(max(stand.unknowns[0] for stand in stands)))
     off = PLACES * max(stand.place_error for stand in stands)
-    return envelope(model, [stand.unknowns for stand in stands], off, margin_of(largest))
+    return _envelope(model, [stand.unknowns for stand in stands], off, margin_of(largest))
 
 
-def envelope(model: ObjectModel, stands: Sequence[FloatArray], off: float, margin: float) -> Mesh:
-    """The space of an object that may stand in several ways.
+def _envelope(model: ObjectModel, stands: Sequence[FloatArray], off: float, margin: float) -> Mesh:
+    """Return the convex space, in base, of an object at any of some poses, ``off`` m around each.
 
-    Args:
-        model: of the object.
-        stands: ``(4,)`` each, log of the size over the nominal one, x, y, m, yaw, rad.
-        off: m that it may be off each of them, along the support, in any direction.
-        margin: m around it, in every direction.
-
-    Returns:
-        Convex, in base, nothing of it below the support.
+    A stand is ``(4,)``: log of the size over the nominal one, x, y, m, yaw, rad; nothing is below z = 0.
     """
     corners = model.corners
     places = hull_of(np.concatenate([placed(model, corners, stand) for stand in stands]))

@@ -45,10 +45,10 @@ class ShapeReadings:
         """Take in a step: a look, a press, or one that was not made."""
         silhouette = self.run.silhouette(record)
         if silhouette is not None:
-            self.look = seen_mask(self.run, silhouette)
+            self.look = _seen_mask(self.run, silhouette)
         elif "gel.image" in record.readings:
             try:
-                self.touches.append(guarded_touch(self.run, record))
+                self.touches.append(_guarded_touch(self.run, record))
             except PictureRefused as refusal:  # whether the gel met anything is not known either
                 self.refused_pictures.append(picture_left_out(record.step.index, refusal))
 
@@ -179,13 +179,8 @@ def base_from_stand(run: RunFiles) -> FloatArray:
     return translation(np.array(run.scene.object.pose.position))
 
 
-def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
-    """One way of the gel.
-
-    Raises:
-        RecordingDamaged: the step has no pictures or no poses.
-        PictureRefused: its picture is not what the calibration was made of.
-    """
+def _guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
+    """Read one way of the gel."""
     settings, seen = run.scene.section(ShapeRun), run.observe(record)
     read = run.gel_reader.read(seen.images)
     read.require_accepted()
@@ -210,13 +205,8 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
     )
 
 
-def seen_mask(run: RunFiles, mask: BoolArray) -> SeenMask | None:
-    """Return the silhouette as evidence; None if the camera did not see the object.
-
-    Args:
-        run: folder of the run.
-        mask: ``(rows, columns)`` the object's pixels.
-    """
+def _seen_mask(run: RunFiles, mask: BoolArray) -> SeenMask | None:
+    """Return the silhouette as evidence; None if the camera did not see the object."""
     camera, settings = run.station.camera, run.scene.section(ShapeRun)
     assert camera is not None  # there are its pictures
     if mask.sum() < limits.MIN_PIXELS:

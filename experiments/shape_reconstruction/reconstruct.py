@@ -106,7 +106,7 @@ def _search(evidence: ShapeEvidence, settings: FamilySettings, smooth: SmoothSur
     """Fit the family by one to three searches, each with its own draws, and return the best fit."""
     best = _fit(evidence, settings)
     seconds, made = best.seconds, 1
-    while needs_search(best, made):
+    while _needs_search(best, made):
         found = _fit(evidence, replace(settings, seed=settings.seed + made))
         seconds, made = seconds + found.seconds, made + 1
         best = min(best, found, key=rank)
@@ -122,7 +122,7 @@ def _continue(
     """Fit the family from earlier hypotheses; repeat a poor fit by a new search next to its hypotheses."""
     found = _fit(evidence, settings, seeds)
     found = _with_predictions(found, evidence, smooth, found.seconds)
-    if not is_poor(found) and rejection_reason(found, smooth) is None:
+    if not is_poor(found) and _rejection_reason(found, smooth) is None:
         return found
     again = _fit(evidence, replace(LEVELS["coarse"], seed=settings.seed), found.mixture.hypotheses)
     return _with_predictions(again, evidence, smooth, found.seconds + again.seconds)
@@ -139,7 +139,7 @@ def _with_predictions(
 ) -> FamilyFit:
     """Predict left-out contacts where the smooth surface competes with a fit that is not yet rejected."""
     fit = replace(fit, seconds=seconds)
-    if smooth is None or rejection_reason(fit, None) is not None:
+    if smooth is None or _rejection_reason(fit, None) is not None:
         return fit
     return replace(fit, left_out=predict_left_out(fit, evidence))
 
@@ -230,7 +230,7 @@ def choose(fit: FamilyFit | None, smooth: SmoothSurface | None, prior: ShapeEsti
         if smooth is None:
             raise FitRefused("nothing was touched, and no household shape fits the picture")
         return _as_smooth(smooth, (), "no household shape at the stated place fits the readings")
-    reason = rejection_reason(fit, smooth)
+    reason = _rejection_reason(fit, smooth)
     if reason is not None and smooth is not None:
         return _as_smooth(smooth, fit.flags, reason)
     count = len(fit.left_out)
@@ -247,13 +247,8 @@ def choose(fit: FamilyFit | None, smooth: SmoothSurface | None, prior: ShapeEsti
     )
 
 
-def rejection_reason(fit: FamilyFit, smooth: SmoothSurface | None) -> str | None:
-    """State why the family is not the answer; None where it is.
-
-    Args:
-        fit: the shape family.
-        smooth: the smooth surface; None without a contact.
-    """
+def _rejection_reason(fit: FamilyFit, smooth: SmoothSurface | None) -> str | None:
+    """State why the family is not the answer; None where it is."""
     count = len(fit.left_out)
     if fit.nuisance.is_excessive:
         return "no household shape fits the readings on a bench as this is calibrated"
@@ -305,15 +300,8 @@ def rank(fit: FamilyFit) -> tuple[bool, float]:
     return poor, fit.contact_cost if poor else fit.mixture.best.cost
 
 
-def needs_search(best: FamilyFit, made: int) -> bool:
-    """Decide whether one more search is made.
-
-    More are made of what fits poorly, of several classes that fit alike, and without a picture.
-
-    Args:
-        best: the best fit so far.
-        made: searches so far.
-    """
+def _needs_search(best: FamilyFit, made: int) -> bool:
+    """Decide on one more search: for a poor fit, several classes that fit alike, or no picture."""
     many = len(best.left_out) >= limits.MIN_CONTACTS
     least = 1 if best.sighted or not many else limits.MIN_BLIND_SEARCHES
     rivals = sum(weight >= limits.MIN_RIVAL_WEIGHT for weight in best.mixture.by_class().values())

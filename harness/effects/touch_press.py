@@ -156,7 +156,7 @@ def press_heights(
         sources = {"touch_height_map": np.maximum(touched, 0.0)[None], "touch_gel": heights[None]}
     press = press_gel(sources, gel, scene, levels, force, of)
     if of == "gel" and reached is not None:
-        press = replace(press, contact=contact_of(reached, gel.calibration, "object"))
+        press = replace(press, contact=_contact_of(reached, gel.calibration, "object"))
     if missing is None or not missing.any():
         return press
     return replace(press, contact=press.contact & ~missing, missing=missing)
@@ -223,10 +223,10 @@ def press_gel(
             require_within_gel(depths, gel.sensor)
     seen: Heights = "gel" if result.height_map is None else of
     heights = done.values["touch_gel" if seen == "gel" else "touch_height_map"][0]
-    return Press(gel, made, done, contact_of(heights, gel.calibration, seen), seen)
+    return Press(gel, made, done, _contact_of(heights, gel.calibration, seen), seen)
 
 
-def contact_of(penetration: FloatArray, calibration: TactileCalibration, of: Heights) -> BoolArray:
+def _contact_of(penetration: FloatArray, calibration: TactileCalibration, of: Heights) -> BoolArray:
     """``(rows, columns)`` where the object touches the gel.
 
     Of an object, every pixel where it reaches the gel. Of a gel, what the object surely shapes: the

@@ -76,7 +76,7 @@ class WorldGel:
         self.calibration = named_calibration(calibration)  #: whose colours this gel has.
         require_own(self.calibration, sensor)
         self._steeper = steeper
-        self._skirt = skirt_of(gap.skirt, sensor.pitch)
+        self._skirt = _skirt_of(gap.skirt, sensor.pitch)
         self._optics = Optics(self.calibration, "exact", -rest_surface(sensor))
         self.background: ByteArray = self.calibration.background
         """``(rows, columns, 3)``, the picture of the untouched gel."""
@@ -99,13 +99,8 @@ class WorldGel:
         return image
 
 
-def skirt_of(blur: float, pitch: float) -> GelSkirt:
-    """Taxim's pyramid of blurs, each half as wide as the one before, that blurs by ``blur`` in all.
-
-    Args:
-        blur: metres, the sigma of all the blurs together.
-        pitch: metres a pixel.
-    """
+def _skirt_of(blur: float, pitch: float) -> GelSkirt:
+    """Return Taxim's pyramid of blurs, each half as wide as the one before: ``blur`` m in all."""
     wanted = blur / pitch
     pyramids: list[tuple[float, tuple[int, ...]]] = []
     for widest in range(_NARROWEST, _WIDEST + 1, 2):

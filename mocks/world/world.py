@@ -169,7 +169,11 @@ class World:
         self.scale = self._draw.run.scale  #: of the true object, over that.
         self.mesh = Mesh(self._deviation.applied(self.nominal.vertices), self.nominal.faces)
         """the true object, in its own frame; the same faces."""
-        self.base_from_object = read_only(self._placed())  #: ``(4, 4)``, where it truly stands.
+        middle = apply(self._bench.base_from_object, self.nominal.bounds.mean(axis=0)[None])[0]
+        run = self._draw.run
+        moved = translation(middle + run.position) @ transform(run.object_rotation, np.zeros(3))
+        placed: FloatArray = moved @ translation(-middle) @ self._bench.base_from_object
+        self.base_from_object = read_only(placed)  #: ``(4, 4)``, where it truly stands.
         self._object_from_base = inverse(self.base_from_object)
         self._raster = RasterMesh(self.mesh)
         self._middle = apply(self.base_from_object, self.mesh.bounds.mean(axis=0)[None])[0]
@@ -304,13 +308,6 @@ class World:
             fixed.append(Body(foam, np.eye(4), (90, 90, 95)))
         base_from_camera, focal = self._draw.camera(camera.base_from_camera, camera.focal_length)
         return SceneView(base_from_camera, camera.rows, camera.columns, focal, fixed)
-
-    def _placed(self) -> FloatArray:
-        middle = apply(self._bench.base_from_object, self.nominal.bounds.mean(axis=0)[None])[0]
-        run = self._draw.run
-        moved = translation(middle + run.position) @ transform(run.object_rotation, np.zeros(3))
-        placed: FloatArray = moved @ translation(-middle) @ self._bench.base_from_object
-        return placed
 
     def _true_flange_from_gel(self, step: int) -> FloatArray:
         if step not in self._flange_from_gel:

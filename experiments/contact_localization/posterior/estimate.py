@@ -261,7 +261,7 @@ def locate(
             lap(seconds, "sounds", start)
         # Sound that tells no places apart leaves both senses with the answer and the floor of touch.
         weighed = heard if heard is not None and (alone or heard.term.says_something) else None
-        found = solve_run(search, k, accuracy, seed, seconds, weighed)
+        found = _solve_run(search, k, accuracy, seed, seconds, weighed)
         doubts: tuple[str, ...] = ()
         if judged and k == count:
             try:
@@ -272,7 +272,7 @@ def locate(
                 # The images are the better judge of the object: if they fit without the strikes, the strikes
                 # are what does not fit.
                 weighed = None
-                found = solve_run(search, k, accuracy, seed, seconds, None)
+                found = _solve_run(search, k, accuracy, seed, seconds, None)
                 doubts = (*_judged(search, found, accuracy, None, k, seconds), SOUND_LEFT_OUT)
         floor = noise.floor * FLOORS[senses if weighed else "touch"]
         answers.append(_answer(search, k, found, seconds, floor, doubts))
@@ -364,7 +364,7 @@ def _everywhere(
     return spread, [search.turning.turned(cloud[owners], turns) for cloud in clouds], owners
 
 
-def solve_run(
+def _solve_run(
     search: Search,
     count: int,
     accuracy: Accuracy,
@@ -372,19 +372,7 @@ def solve_run(
     seconds: dict[str, float],
     heard: StrikeEvidence | None,
 ) -> PosteriorSolution:
-    """The posterior of the first ``count`` contacts.
-
-    Args:
-        search: the run.
-        count: contacts that are used.
-        accuracy: the method and its dials.
-        seed: of the draws inside the method.
-        seconds: by stage; what is spent here is added.
-        heard: what their strikes said; None without.
-
-    Raises:
-        FitRefused: no image shows a contact, and no sound is asked for alone.
-    """
+    """Compute the posterior of the first ``count`` contacts; add the seconds of each stage."""
     if accuracy.of(SENSES) == "audio":
         assert heard is not None
         start = time.perf_counter()

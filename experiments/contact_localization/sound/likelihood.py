@@ -153,7 +153,7 @@ class SoundTerm:
         frequencies = np.array([peak.frequency for peak in self._peaks])
         self.scales: Scales = likely_scales(frequencies, modes.frequencies, noise)
         """frequency scales between object and model, most probable first."""
-        self._pairs = pairs_of(frequencies, self._group_frequencies(), self.scales.factors, noise)
+        self._pairs = _pairs_of(frequencies, self._group_frequencies(), self.scales.factors, noise)
         squares = self._table.mean_squares
         result = np.empty(len(squares))
         for a, b in zip(self._starts[:-1], self._starts[1:], strict=True):
@@ -392,15 +392,8 @@ def likely_scales(peaks: FloatArray, modes: FloatArray, noise: SoundNoise) -> Sc
     return Scales(np.exp(grid[chosen]), nats[chosen] - logsumexp(nats[chosen]))
 
 
-def pairs_of(peaks: FloatArray, groups: FloatArray, factors: FloatArray, noise: SoundNoise) -> Pairs:
-    """The groups near each peak, under each scale.
-
-    Args:
-        peaks: ``(P,)`` Hz.
-        groups: ``(G,)`` Hz, of the groups of modes.
-        factors: ``(S,)`` scales.
-        noise: of the frequencies.
-    """
+def _pairs_of(peaks: FloatArray, groups: FloatArray, factors: FloatArray, noise: SoundNoise) -> Pairs:
+    """Find the groups of modes near each peak, under each of ``(S,)`` scales."""
     starts, found, shares = [0], [], []
     clutter = np.ones((len(factors), len(peaks)))
     for index, peak in enumerate(peaks):

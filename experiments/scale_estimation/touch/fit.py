@@ -252,7 +252,16 @@ class TouchProblem:
             better = cost < least
             best[better], least[better] = here[better], cost[better]
             if last < rounds:
-                here = here + self._step(residuals, slopes, here, fixed_size)
+                prior = self._prior**2
+                normal = np.einsum("kri,krj->kij", slopes, slopes) + np.diag(prior)
+                gradient = np.einsum("kri,kr->ki", slopes, residuals) + prior * here
+                first = 1 if fixed_size else 0
+                scale = np.einsum("kii->ki", normal)[:, first:] * 1e-3 + 1e-6
+                inner = normal[:, first:, first:] + scale[..., None] * np.eye(UNKNOWNS - first)
+                step = np.zeros_like(here)
+                step[:, first:] = -np.linalg.solve(inner, gradient[:, first:, None])[..., 0]
+                reach = np.array([0.3, 0.05, 0.05, 0.5, 0.01, 0.02, 0.02, 2.0e-3])
+                here = here + np.asarray(np.clip(step, -reach, reach))
         return best, least
 
     def sigma(self, unknowns: FloatArray) -> float:
@@ -270,20 +279,6 @@ class TouchProblem:
         e = self.stand.errors
         sigmas = [np.inf, e.place, e.place, np.inf, e.support, e.tilt, e.tilt, e.depth]
         return 1.0 / np.array(sigmas)
-
-    def _step(
-        self, residuals: FloatArray, slopes: FloatArray, here: FloatArray, fixed_size: bool
-    ) -> FloatArray:
-        prior = self._prior**2
-        normal = np.einsum("kri,krj->kij", slopes, slopes) + np.diag(prior)
-        gradient = np.einsum("kri,kr->ki", slopes, residuals) + prior * here
-        first = 1 if fixed_size else 0
-        scale = np.einsum("kii->ki", normal)[:, first:] * 1e-3 + 1e-6
-        inner = normal[:, first:, first:] + scale[..., None] * np.eye(UNKNOWNS - first)
-        step = np.zeros_like(here)
-        step[:, first:] = -np.linalg.solve(inner, gradient[:, first:, None])[..., 0]
-        reach = np.array([0.3, 0.05, 0.05, 0.5, 0.01, 0.02, 0.02, 2.0e-3])
-        return np.asarray(np.clip(step, -reach, reach))
 
     def _linear(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """``(k, c)`` deviations, weighed by the cap, their slopes ``(k, c, UNKNOWNS)``, costs ``(k,)``."""

@@ -120,7 +120,7 @@ def train_completion(
     """
     last = amounts.shapes - round(HELD_OUT * amounts.shapes)
     learnt, held = samples.of(samples.shapes < last), samples.of(samples.shapes >= last)
-    module = fitted_completion(name, make, learnt, amounts, seed, device)
+    module = _fitted_completion(name, make, learnt, amounts, seed, device)
     card = {
         **described,
         "parameters": sum(value.numel() for value in module.parameters()),
@@ -149,7 +149,7 @@ _COARSE_COMPARED = 1024
 _SECONDS_BETWEEN_LINES = 20.0
 
 
-def fitted_completion(
+def _fitted_completion(
     name: str,
     make: Callable[[], Any],
     samples: CompletionSamples,
@@ -157,16 +157,7 @@ def fitted_completion(
     seed: int,
     device: str,
 ) -> Any:
-    """Fit a network; its rate rises for a hundredth of the steps, then falls as half a cosine.
-
-    Args:
-        name: name of the network, for progress.
-        make: creates the network, with its first weights.
-        samples: training samples.
-        amounts: profile of the fit.
-        seed: seed of the first weights and of the order of samples.
-        device: ``"cpu"`` or ``"cuda"``; sums on the latter are in no fixed order.
-    """
+    """Fit a network; its rate rises for a hundredth of the steps, then falls as half a cosine."""
     torch.manual_seed(seed)
     torch.set_float32_matmul_precision("high")
     draw = torch.Generator().manual_seed(seed)

@@ -215,7 +215,7 @@ def fit_rbf(evidence: ShapeEvidence, symmetric: bool = True) -> RbfFit:
     room = None if axis is None else rotated_space(axis, samples, evidence)
     bounds = _Bounds(evidence, data.points, silhouette, room)
     if silhouette is not None:
-        rim = rim_data(silhouette, _cut(field, bounds), data.points, low, high)
+        rim = _rim_data(silhouette, _cut(field, bounds), data.points, low, high)
         field = fitted(data.joined(rim), low, high, by_contacts.amplitude)
     grid = Grid.over(low, high, PITCH)
     body = grid.surface(grid.near_zero(_cut(field, bounds)), samples.points)
@@ -306,22 +306,14 @@ APART = 10.0e-3
 _DEPTHS = 40
 
 
-def rim_data(
+def _rim_data(
     silhouette: Silhouette,
     field: Callable[[FloatArray], FloatArray],
     contacts: FloatArray,
     low: FloatArray,
     high: FloatArray,
 ) -> SurfaceData:
-    """Find the points where a field is smallest along rays of the border, as data of the surface.
-
-    Args:
-        silhouette: of the picture.
-        field: m at ``(n, 3)`` m, below zero inside.
-        contacts: ``(n, 3)`` m.
-        low: ``(3,)`` m, of the box in which the object is.
-        high: ``(3,)`` m.
-    """
+    """Find the points where a field is smallest along rays of the border, as data of the surface."""
     pixels, outward = _border(silhouette)
     pose = silhouette.look.stand_from_camera
     origin = pose[:3, 3]

@@ -50,16 +50,11 @@ def contact_place(mesh: Mesh, asked: FloatArray) -> ContactPlace:
     point = np.asarray(asked, dtype=np.float64)
     if point.shape != (3,):
         raise WrongUse(f"a contact at {asked} is no place; give three finite numbers, x y z in metres")
-    return contact_places(mesh, point[None])[0]
+    return _contact_places(mesh, point[None])[0]
 
 
-def contact_places(mesh: Mesh, points: FloatArray) -> tuple[ContactPlace, ...]:
-    """The places of a surface nearest to ``(n, 3)`` metres, each as ``contact_place`` gives it.
-
-    Raises:
-        WrongUse: a point that is not finite.
-        OutOfDomain: a point that is farther than ``MOST_MOVED``; the distance is named.
-    """
+def _contact_places(mesh: Mesh, points: FloatArray) -> tuple[ContactPlace, ...]:
+    """Find the places of a surface nearest to ``(n, 3)`` metres, each as ``contact_place`` gives it."""
     for point in points:
         if not np.isfinite(point).all():
             raise WrongUse(f"a contact at {point} is no place; give three finite numbers, x y z in metres")
@@ -267,7 +262,7 @@ def presses_of(mesh: Mesh, gel_from_object: FloatArray) -> Presses:
             "presses no place of it; press elsewhere, or take touch.shapes = reference"
         )
     points = object_from_gel[:, :3, 3] + gaps[:, None] * object_from_gel[:, :3, 2]
-    normals = np.array([place.normal for place in contact_places(mesh, points)]).reshape(-1, 3)
+    normals = np.array([place.normal for place in _contact_places(mesh, points)]).reshape(-1, 3)
     leant = np.swapaxes(frames_facing(-normals), 1, 2) @ object_from_gel[:, :3, :3]
     across = np.hypot(leant[:, 0, 2], leant[:, 1, 2])
     tilts = np.arctan2(across, leant[:, 2, 2])

@@ -99,7 +99,7 @@ def builtin_appearance(
         np.ones((count, 3, 3)),
         places,
         np.zeros(count, np.int64),
-        (print_of(MATERIALS[name]),),
+        (_print_of(MATERIALS[name]),),
     )
 
 
@@ -227,12 +227,8 @@ def _coloured(mesh: Mesh, read: MeshFile, crease: float) -> Appearance:
     )
 
 
-def print_of(material: str) -> ByteArray:
-    """``(rows, columns, 3)`` sRGB: the print of a material, as wide and high as the object's box.
-
-    Raises:
-        WrongUse: a material of no built-in object.
-    """
+def _print_of(material: str) -> ByteArray:
+    """Return the print of a material, ``(rows, columns, 3)`` sRGB, as wide and high as the object's box."""
     if material not in COLOURS:
         raise WrongUse(f"no colour of {material!r} is known; there are {', '.join(COLOURS)}")
     base, printed = (np.array(colour) for colour in COLOURS[material])

@@ -210,7 +210,7 @@ def curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra)
     way = np.zeros_like(mesh.nodes)
     way[: len(tetrahedra.nodes)] = tetrahedra.nodes - undeformed.nodes
     way[len(tetrahedra.nodes) :] = middles_of(way, mesh.cells, len(way))[len(tetrahedra.nodes) :]
-    moved = straightened(QuadraticMesh(mesh.nodes + way, mesh.cells, mesh.faces))
+    moved = _straightened(QuadraticMesh(mesh.nodes + way, mesh.cells, mesh.faces))
     if least_determinant(moved).min() <= 0.0:
         raise MeshRefused("the deformation turns an element inside out; deform the object less")
     return moved
@@ -282,12 +282,8 @@ def snapped(mesh: QuadraticMesh, surface: Mesh) -> QuadraticMesh:
     return mesh
 
 
-def straightened(mesh: QuadraticMesh) -> QuadraticMesh:
-    """The same cells, straight where bending turned them inside out: corners stay, middle nodes go back.
-
-    Args:
-        mesh: with corners whose straight cells are not inside out.
-    """
+def _straightened(mesh: QuadraticMesh) -> QuadraticMesh:
+    """Straighten cells that bending turned inside out: corners stay, middle nodes go back."""
     corners = int(mesh.cells[:, :4].max()) + 1
     straight = _with_middles(mesh, mesh.nodes, corners)
     loose = np.zeros(len(mesh.nodes), dtype=np.bool_)

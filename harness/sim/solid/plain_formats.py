@@ -98,7 +98,7 @@ def read_obj(path: Path) -> PlainMesh:
                 f"{name}, line {line}: the statement {show(kind)!r} is not read; export polygons only"
             )
         elif (separated := _SEPARATED_STATEMENT.match(kind)) is not None:
-            raise refuse_separator(separated[1], name, line)
+            raise _refuse_separator(separated[1], name, line)
     places, used = np.array(vertices).reshape(-1, 3), np.array(corners, dtype=np.int64)
     first, notes = _first_number(used, len(places), relative, name)
     return PlainMesh(places, triangulated(places, used - first, np.array(lengths, dtype=np.int64)), notes)
@@ -381,21 +381,15 @@ def refuse_number(words: list[bytes], name: str, line: int, wanted: str) -> Mesh
     if any(_DECIMAL_COMMA.fullmatch(word) for word in words):
         return MeshRefused(f"{name}, line {line}: {text!r} has decimal commas; export it with decimal points")
     if (found := _SEPARATOR.search(b" ".join(words))) is not None:
-        return refuse_separator(found[0], name, line)
+        return _refuse_separator(found[0], name, line)
     return MeshRefused(
         f"{name}, line {line}: expected {wanted}, found {text!r}; the file is cut short or damaged, "
         "export it again"
     )
 
 
-def refuse_separator(separator: bytes, name: str, line: int) -> MeshRefused:
-    """Describe a line whose words are not separated by spaces.
-
-    Args:
-        separator: what is between its words.
-        name: name of the file.
-        line: its number, from 1.
-    """
+def _refuse_separator(separator: bytes, name: str, line: int) -> MeshRefused:
+    """Describe a line whose words are not separated by spaces."""
     shown = _SEPARATOR_NAMES.get(separator, show(separator))
     return MeshRefused(f"{name}, line {line}: words are separated by {shown}; export it with spaces")
 

@@ -181,12 +181,12 @@ def _oriented(nodes: FloatArray, cells: IntArray) -> tuple[QuadraticMesh, tuple[
             "the stiffness would lose its digits; collapse them, or mesh the object again"
         )
     if cells.shape[1] == 10:
-        cells = ordered_middles(nodes, cells, said)
-        check_shared(cells)
+        cells = _ordered_middles(nodes, cells, said)
+        _check_shared(cells)
     reversed_ = signed_volumes(nodes, cells) < 0.0
     order = _REVERSED[: cells.shape[1]]
     cells = np.where(reversed_[:, None], cells[:, order], cells)
-    check_overlap(cells, reversed_)
+    _check_overlap(cells, reversed_)
     if reversed_.any() and not reversed_.all():
         said.append(f"{int(reversed_.sum())} elements were numbered the other way round and are turned")
     if cells.shape[1] == 4:
@@ -195,7 +195,7 @@ def _oriented(nodes: FloatArray, cells: IntArray) -> tuple[QuadraticMesh, tuple[
         said.append(f"the cells have four nodes, too stiff to be solved; {added} middle nodes were added")
     else:
         mesh = QuadraticMesh(nodes, cells, six_node_faces(cells))
-    quality = check_curved(mesh, said)
+    quality = _check_curved(mesh, said)
     return mesh, tuple(said), quality
 
 
@@ -218,17 +218,8 @@ def named(chosen: BoolArray) -> str:
     return f"element{'s' if len(numbers) > 1 else ''} {listed}{more}"
 
 
-def check_overlap(cells: IntArray, reversed_: BoolArray) -> None:
-    """Refuse oriented cells that lie on the same side of the face that they share.
-
-    Args:
-        cells: ``(c, 4)`` or more, positively oriented.
-        reversed_: ``(c,)``, which had to be turned; of two that overlap, the one to blame if
-            their neighbours were not.
-
-    Raises:
-        MeshRefused: with the numbers of the cells that are inside out.
-    """
+def _check_overlap(cells: IntArray, reversed_: BoolArray) -> None:
+    """Refuse oriented cells on the same side of a shared face; the reversed one of two is to blame."""
     faces = cells[:, FACES].reshape(-1, 3)
     even = (faces < np.roll(faces, -1, axis=1)).sum(axis=1) == 2
     keys = np.column_stack([np.sort(faces, axis=1), even])
@@ -244,7 +235,7 @@ def check_overlap(cells: IntArray, reversed_: BoolArray) -> None:
     )
 
 
-def ordered_middles(nodes: FloatArray, cells: IntArray, said: list[str]) -> IntArray:
+def _ordered_middles(nodes: FloatArray, cells: IntArray, said: list[str]) -> IntArray:
     """Ten-node cells with each middle node on its own edge.
 
     Formats differ in the order of the middle nodes. Where a node is far from its edge and one
@@ -280,12 +271,8 @@ def ordered_middles(nodes: FloatArray, cells: IntArray, said: list[str]) -> IntA
     return tried
 
 
-def check_shared(cells: IntArray) -> None:
-    """Refuse ten-node cells that share an edge but not its middle node.
-
-    Raises:
-        MeshRefused: with the numbers of the cells.
-    """
+def _check_shared(cells: IntArray) -> None:
+    """Refuse ten-node cells that share an edge but not its middle node."""
     ends = np.sort(cells[:, EDGES], axis=2).reshape(-1, 2)
     _, edge = np.unique(ends, axis=0, return_inverse=True)
     edge = edge.ravel()
@@ -299,12 +286,8 @@ def check_shared(cells: IntArray) -> None:
         )
 
 
-def check_curved(mesh: QuadraticMesh, said: list[str]) -> float:
-    """The least quality of a cell; poor ones are said.
-
-    Raises:
-        MeshRefused: cells that their middle nodes turn inside out, by number.
-    """
+def _check_curved(mesh: QuadraticMesh, said: list[str]) -> float:
+    """Return the least quality of a cell; report poor ones, refuse those that are inside out."""
     straight = 6.0 * signed_volumes(mesh.nodes, mesh.cells)
     share = least_determinant(mesh) / straight
     if share.min() <= 0.0:

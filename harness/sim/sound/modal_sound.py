@@ -224,11 +224,8 @@ def radiation(modes: Modes, distance: float) -> FloatArray:
         np.add.at(areas, modes.faces[:, corner], faces.face_areas / 3.0)
     outward = np.einsum("nmd,nd->nm", modes.shapes, modes.normals)
     per_volume = AIR_DENSITY * omega / (4.0 * np.pi * distance)
-    return np.asarray(per_volume * _flow(modes, areas[:, None] * outward, omega / SPEED_OF_SOUND))
-
-
-def _flow(modes: Modes, flow: FloatArray, wavenumbers: FloatArray) -> FloatArray:
-    """``(m,)``: rms over directions of ``(n, m)`` flows added up with their delays."""
+    flow = areas[:, None] * outward
+    wavenumbers = omega / SPEED_OF_SOUND
     middle = modes.points.mean(axis=0)
     height = 1.0 - (2.0 * np.arange(_DIRECTIONS) + 1.0) / _DIRECTIONS
     turn = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(_DIRECTIONS)
@@ -239,4 +236,4 @@ def _flow(modes: Modes, flow: FloatArray, wavenumbers: FloatArray) -> FloatArray
     for mode, wavenumber in enumerate(wavenumbers):
         phase = wavenumber * ahead
         total[mode] = np.mean((flow[:, mode] @ np.cos(phase)) ** 2 + (flow[:, mode] @ np.sin(phase)) ** 2)
-    return np.sqrt(total)
+    return np.asarray(per_volume * np.sqrt(total))

@@ -98,7 +98,18 @@ def synthesize(
     # A phase has an error of four roundings of its cycles, at the time of the largest effect.
     lasting = np.minimum(samples / rate, 1.0 / (np.e * np.maximum(d, 1e-300)))
     phase_errors = np.abs(parts) @ (4.0 * np.finfo(np.float64).eps * np.pi * f * lasting)
-    errors += phase_errors + _rounding(parts, peaks, samples, level)
+    double = float(np.finfo(np.float64).eps) / 2.0
+    unit = float(np.finfo(np.float32).eps) / 2.0 if level == "fast" else double
+    sizes = np.abs(parts)
+    whole = np.sqrt(np.sum(sizes**2, axis=1))
+    modes = terms = parts.shape[1]
+    if level != "exact":
+        # Maximum number of terms in one sum: those of a group, and then the groups.
+        terms = min(modes, TOGETHER) + modes / TOGETHER + min(modes / TILE, SPLITS)
+    walk = np.sqrt((2.0 + terms) / 3.0) * np.maximum(_SIGMAS * np.sqrt(0.5) * whole, peaks)
+    block = _block_length(samples)
+    powers = np.sqrt(5.0) * (block + samples / block) * sizes.sum(axis=1)
+    errors += phase_errors + np.asarray(unit * (walk + 6.0 * whole) + double * powers)
     return Synthesis(
         read_only(sound), rate, read_only(~heard), decibels(errors, peaks), time.perf_counter() - begun
     )
@@ -163,31 +174,6 @@ def faded_after(frequencies: FloatArray, dampings: FloatArray, rate: float) -> i
     over = np.sqrt(np.maximum((dampings - omega) * (dampings + omega), 0.0))
     slow = np.where(dampings > omega, omega**2 / np.maximum(dampings + over, omega), dampings)
     return int(min(np.ceil(_FADED * rate / max(float(slow.min()), 1e-12)), 2.0**53))
-
-
-def _rounding(amplitudes: AnyArray, peaks: FloatArray, samples: int, level: SynthesisLevel) -> FloatArray:
-    """``(k,)``: what roundings add up to.
-
-    Those of the tables and of the sum are a random walk along two terms a mode of each group and then
-    along the groups, its partial sums as large as independent
-    phases make them, or as the sound itself where they agree (Higham and Mary,
-    A New Approach to Probabilistic Rounding Error Analysis, SIAM J. Sci. Comput. 41(5), 2019, for why
-    a walk and not the sum of all roundings). Those of the powers in the tables are bounded: each
-    complex product is off by the square root of five units (Brent, Percival and Zimmermann, Error
-    Bounds on Complex Floating-Point Multiplication, Math. Comp. 76, 2007).
-    """
-    double = float(np.finfo(np.float64).eps) / 2.0
-    unit = float(np.finfo(np.float32).eps) / 2.0 if level == "fast" else double
-    sizes = np.abs(amplitudes)
-    whole = np.sqrt(np.sum(sizes**2, axis=1))
-    modes = terms = amplitudes.shape[1]
-    if level != "exact":
-        # Maximum number of terms in one sum: those of a group, and then the groups.
-        terms = min(modes, TOGETHER) + modes / TOGETHER + min(modes / TILE, SPLITS)
-    walk = np.sqrt((2.0 + terms) / 3.0) * np.maximum(_SIGMAS * np.sqrt(0.5) * whole, peaks)
-    block = _block_length(samples)
-    powers = np.sqrt(5.0) * (block + samples / block) * sizes.sum(axis=1)
-    return np.asarray(unit * (walk + 6.0 * whole) + double * powers)
 
 
 def loudest(sound: FloatArray) -> FloatArray:

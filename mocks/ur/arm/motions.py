@@ -4,9 +4,10 @@ Blends are not modelled: every move comes to rest at its goal.
 """
 
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final, Generic, Protocol, TypeVar
 
 from mocks.ur.arm import poses
 from mocks.ur.arm.poses import Vector
@@ -64,6 +65,9 @@ Twist = tuple[Vector, Vector]
 """m/s and rad/s of the tool centre point, in base."""
 
 
+Goal = TypeVar("Goal", Six, Matrix)
+
+
 class ArmBody(Protocol):
     """What a motion moves."""
 
@@ -96,88 +100,84 @@ class ArmMotion(Protocol):
         """Start again from where the arm is, after a stop in between."""
 
 
-class MoveJoints:
-    """``movej``: all joints in proportion to the one that turns most.
+class _PlannedMove(Generic[Goal]):
+    """A move from rest to rest that is planned where it begins.
 
     Args:
-        goal: rad.
-        speed: rad/s of the leading joint.
-        acceleration: rad/s^2 of the leading joint.
+        goal: joints in rad, or ``base_from_tcp``.
+        speed: rad/s of the leading joint, or m/s.
+        acceleration: rad/s^2 of the leading joint, or m/s^2.
         duration: s; where above zero it decides instead.
     """
 
-    def __init__(self, goal: Six, speed: float, acceleration: float, duration: float = 0.0) -> None:
-        self._goal = goal
+    def __init__(self, goal: Goal, speed: float, acceleration: float, duration: float = 0.0) -> None:
+        self._goal: Goal = goal
         self._limits = speed, acceleration, duration
-        self._start: Six | None = None
+        self._start: Goal | None = None
         self._profile = Trapezoid(0.0, 0.0)
         self._time = 0.0
         self.done = False
 
     def advance(self, body: ArmBody, seconds: float) -> None:
         """Move on."""
-        if self._start is None:
-            self._begin(body)
-        assert self._start is not None, "just begun"
+        start = self._start
+        if start is None:
+            speed, acceleration, duration = self._limits
+            self._start = start = self._place(body)
+            self._time, length = 0.0, self._length(start)
+            self._profile = lasting(duration) if duration > 0.0 else trapezoid(length, speed, acceleration)
         self._time += seconds
         share = self._profile.share(self._time)
         self.done = share == 1.0
-        pairs = zip(self._start, self._goal, strict=True)
+        self._put(body, start, share)
+
+    def replan(self) -> None:
+        """From where the arm is."""
+        self._start = None
+
+    @abstractmethod
+    def _place(self, body: ArmBody) -> Goal:
+        """Return where the arm is."""
+
+    @abstractmethod
+    def _length(self, start: Goal) -> float:
+        """Return the length of the move, in rad or m."""
+
+    @abstractmethod
+    def _put(self, body: ArmBody, start: Goal, share: float) -> None:
+        """Command the body at a share of the move."""
+
+
+class MoveJoints(_PlannedMove[Six]):
+    """``movej``: all joints in proportion to the one that turns most."""
+
+    def _place(self, body: ArmBody) -> Six:
+        return body.joints
+
+    def _length(self, start: Six) -> float:
+        return max(abs(b - a) for a, b in zip(start, self._goal, strict=True))
+
+    def _put(self, body: ArmBody, start: Six, share: float) -> None:
+        pairs = zip(start, self._goal, strict=True)
         body.put_joints(self._goal if self.done else as_six([a + share * (b - a) for a, b in pairs]))
 
-    def replan(self) -> None:
-        """From where the arm is."""
-        self._start = None
 
-    def _begin(self, body: ArmBody) -> None:
-        speed, acceleration, duration = self._limits
-        self._start, self._time = body.joints, 0.0
-        furthest = max(abs(b - a) for a, b in zip(self._start, self._goal, strict=True))
-        self._profile = lasting(duration) if duration > 0.0 else trapezoid(furthest, speed, acceleration)
+class MoveLine(_PlannedMove[Matrix]):
+    """``movel``: the tool centre point in a straight line, turning evenly."""
 
+    _turn: Vector = (0.0, 0.0, 0.0)
 
-class MoveLine:
-    """``movel``: the tool centre point in a straight line, turning evenly.
+    def _place(self, body: ArmBody) -> Matrix:
+        return body.base_from_tcp
 
-    Args:
-        goal: ``base_from_tcp``.
-        speed: m/s.
-        acceleration: m/s^2.
-        duration: s; where above zero it decides instead.
-    """
+    def _length(self, start: Matrix) -> float:
+        self._turn = poses.rotation_vector(poses.compose(poses.inverse(start), self._goal))
+        length = math.dist(poses.translation(start), poses.translation(self._goal))
+        return max(length, TURN_LENGTH * math.hypot(*self._turn))
 
-    def __init__(self, goal: Matrix, speed: float, acceleration: float, duration: float = 0.0) -> None:
-        self._goal = goal
-        self._limits = speed, acceleration, duration
-        self._start: Matrix | None = None
-        self._turn = (0.0, 0.0, 0.0)
-        self._profile = Trapezoid(0.0, 0.0)
-        self._time = 0.0
-        self.done = False
-
-    def advance(self, body: ArmBody, seconds: float) -> None:
-        """Move on."""
-        if self._start is None:
-            self._begin(body)
-        assert self._start is not None, "just begun"
-        self._time += seconds
-        share = self._profile.share(self._time)
-        self.done = share == 1.0
+    def _put(self, body: ArmBody, start: Matrix, share: float) -> None:
         end = poses.translation(self._goal)
-        pose = self._goal if self.done else poses.between(self._start, self._turn, end, share)
-        body.put_tcp(pose)
-
-    def replan(self) -> None:
-        """From where the arm is."""
-        self._start = None
-
-    def _begin(self, body: ArmBody) -> None:
-        speed, acceleration, duration = self._limits
-        self._start, self._time = body.base_from_tcp, 0.0
-        self._turn = poses.rotation_vector(poses.compose(poses.inverse(self._start), self._goal))
-        length = math.dist(poses.translation(self._start), poses.translation(self._goal))
-        way = max(length, TURN_LENGTH * math.hypot(*self._turn))
-        self._profile = lasting(duration) if duration > 0.0 else trapezoid(way, speed, acceleration)
+        body.put_tcp(self._goal if self.done else poses.between(start, self._turn, end, share))
 
 
 class SpeedLine:

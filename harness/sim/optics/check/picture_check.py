@@ -171,8 +171,8 @@ def checked_picture(
     untouched = calibration.background if background is None else background
     rest = block_means(untouched, block)
     for levels, picture in ((seen, image), (rest, untouched)):
-        require_light(levels, known)
-        require_unclipped(picture, calibration.background)
+        _require_light(levels, known)
+        _require_unclipped(picture, calibration.background)
         require_whole(picture, calibration.background)
     rest_light = match_light(known, known) if background is None else _light_of_rest(rest, known)
     light, agrees, doubt, refusal = _settled_light(
@@ -181,8 +181,8 @@ def checked_picture(
     gain = light.gain(*image.shape[:2]) * rest_light.gain(*image.shape[:2])
     _require_gain(gain, light.offset + rest_light.offset)
     shown = np.clip(light.apply(rest), 0.0, 255.0)
-    require_lit(seen, shown)
-    require_quiet(image, untouched)
+    _require_lit(seen, shown)
+    _require_quiet(image, untouched)
     _require_colours(image, untouched, np.linalg.norm(seen - shown, axis=2) > _SURROUNDINGS, block)
     light_error = _light_error(light, _SURROUNDINGS if agrees else 3.0 * _CLOSE_AT_REST)
     light_error = max(light_error, doubt)
@@ -489,16 +489,8 @@ def _require_press(change: FloatArray, calibration: TactileCalibration, block: i
     )
 
 
-def require_light(seen: FloatArray, known: FloatArray) -> None:
-    """Refuse a picture that is all but black beside its calibration's resting one.
-
-    Args:
-        seen: ``(rows, columns, 3)`` grey levels, means over blocks.
-        known: the same, of the calibration's background.
-
-    Raises:
-        PictureRefused: with the share of the light.
-    """
+def _require_light(seen: FloatArray, known: FloatArray) -> None:
+    """Refuse a picture that is all but black next to its calibration's resting one."""
     left = float(seen.sum() / max(float(known.sum()), 1.0))
     if left < _NO_LIGHT:
         raise PictureRefused(
@@ -526,16 +518,8 @@ def require_whole(image: ByteArray, known: ByteArray) -> None:
         )
 
 
-def require_unclipped(image: ByteArray, known: ByteArray) -> None:
-    """Refuse a picture of which far more is clipped than of its calibration's background.
-
-    Args:
-        image: ``(rows, columns, 3)`` RGB.
-        known: the same, of the calibration's background.
-
-    Raises:
-        PictureRefused: with the share of the values.
-    """
+def _require_unclipped(image: ByteArray, known: ByteArray) -> None:
+    """Refuse a picture of which far more is clipped than of its calibration's background."""
     clipped = _clipped(image) - _clipped(known)
     if clipped > _MOST_CLIPPED:
         raise PictureRefused(
@@ -544,16 +528,8 @@ def require_unclipped(image: ByteArray, known: ByteArray) -> None:
         )
 
 
-def require_quiet(image: ByteArray, rest: ByteArray) -> None:
-    """Refuse colours that jump from pixel to pixel as a bad cable's do, or a camera's without light.
-
-    Args:
-        image: ``(rows, columns, 3)`` RGB.
-        rest: the same, of the resting gel.
-
-    Raises:
-        PictureRefused: with the jump in grey levels.
-    """
+def _require_quiet(image: ByteArray, rest: ByteArray) -> None:
+    """Refuse colours that jump from pixel to pixel as a bad cable's do, or a camera's without light."""
     jump = float(np.median(np.abs(np.diff(image[::8].astype(np.int16) - rest[::8], axis=1))))
     if jump > _MOST_NOISE:
         raise PictureRefused(
@@ -562,16 +538,8 @@ def require_quiet(image: ByteArray, rest: ByteArray) -> None:
         )
 
 
-def require_lit(seen: FloatArray, rest: FloatArray) -> None:
-    """Refuse a picture of which a part is darker or brighter in every channel than a press makes a gel.
-
-    Args:
-        seen: ``(rows, columns, 3)`` grey levels, means over blocks.
-        rest: the same, of the resting gel in the light of the moment.
-
-    Raises:
-        PictureRefused: with the share of the picture.
-    """
+def _require_lit(seen: FloatArray, rest: FloatArray) -> None:
+    """Refuse a picture of which a part is darker or brighter in every channel than a press makes a gel."""
     ratio = (seen + 1.0) / (rest + 1.0)
     dark = float((ratio.max(axis=2) < _DARKEST).mean())
     bright = float((ratio.min(axis=2) > 1.0 / _DARKEST).mean())

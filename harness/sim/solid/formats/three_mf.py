@@ -251,7 +251,11 @@ class _Model:
         if space not in ("", _CORE):
             self._begin_foreign(space, name, attributes)
         elif name == "vertex":
-            self._vertex(self._mesh(name), attributes)
+            now = self._mesh(name)
+            try:
+                now.vertices.extend((float(attributes["x"]), float(attributes["y"]), float(attributes["z"])))
+            except (KeyError, ValueError) as error:
+                raise self.reader.refuse(f"a <vertex> without three numbers: {attributes!r:.80}") from error
             self.reader.vertices += 1
             if self.reader.vertices > _MAX_VERTICES:
                 raise MeshRefused(
@@ -260,7 +264,13 @@ class _Model:
         elif name == "triangle":
             self._triangle(self._mesh(name), attributes)
         elif name == "object":
-            self._begin_object(attributes)
+            key = (self.part, attributes.get("id", ""))
+            if key in self.reader.objects:
+                raise self.reader.refuse(f"two objects have the id {key[1]!r}")
+            self.now = _Object(attributes.get("type", "model"))
+            if "pid" in attributes:
+                self.now.default = (attributes["pid"], self._int(attributes.get("pindex", "0")))
+            self.reader.objects[key] = self.now
         elif name == "component":
             self._mesh(name).components.append(self._reference(attributes))
         elif name == "item" and self.is_root and attributes.get("printable", "1") in ("0", "false"):
@@ -300,15 +310,6 @@ class _Model:
         elif unit != self.reader.unit:
             raise self.reader.refuse(f"its parts are in {self.reader.unit} and in {unit}")
 
-    def _begin_object(self, attributes: dict[str, str]) -> None:
-        key = (self.part, attributes.get("id", ""))
-        if key in self.reader.objects:
-            raise self.reader.refuse(f"two objects have the id {key[1]!r}")
-        self.now = _Object(attributes.get("type", "model"))
-        if "pid" in attributes:
-            self.now.default = (attributes["pid"], self._int(attributes.get("pindex", "0")))
-        self.reader.objects[key] = self.now
-
     def _begin_foreign(self, space: str, name: str, attributes: dict[str, str]) -> None:
         """An element of an extension."""
         if space != _MATERIALS:
@@ -323,12 +324,6 @@ class _Model:
         if self.now is None:
             raise self.reader.refuse(f"a <{name}> stands outside an object")
         return self.now
-
-    def _vertex(self, now: _Object, attributes: dict[str, str]) -> None:
-        try:
-            now.vertices.extend((float(attributes["x"]), float(attributes["y"]), float(attributes["z"])))
-        except (KeyError, ValueError) as error:
-            raise self.reader.refuse(f"a <vertex> without three numbers: {attributes!r:.80}") from error
 
     def _triangle(self, now: _Object, attributes: dict[str, str]) -> None:
         self.reader.triangles += 1
