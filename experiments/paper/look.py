@@ -19,8 +19,8 @@ from scipy.ndimage import binary_dilation
 
 from experiments.paper.rendering import (
     Column,
+    FieldSpec,
     MadeMethod,
-    Render,
     RenderingMethod,
     RenderingWork,
     Sense,
@@ -43,7 +43,7 @@ from harness.objectfile.published.volume_render import Field, render_rays, stret
 from harness.objectfile.runtime import Network
 from harness.objectfile.vision.graph import VisionNetworks, vision_graph
 from harness.objectfile.vision.network import PAPER, PER_CELL, VisionGrid
-from harness.objectfile.vision.render import RenderSettings, VisionRenderer, open_vision
+from harness.objectfile.vision.render import RenderSettings, open_vision
 from harness.objects.builtin import BUILTIN
 from harness.picture.linear_image import LinearImage
 from harness.picture.pinhole import DirectionalLight, Pinhole
@@ -53,22 +53,6 @@ from harness.sim.light.direct_image import LitObject
 
 KILO_OSF: Final = CellsSpec(PAPER, places=1_500_000, steps=600)
 """2.0's VisionNet: the published size and inputs, 16^3 cells."""
-
-
-@dataclass(frozen=True)
-class FieldSpec:
-    """One network for the look of an object, and its training by Adam."""
-
-    depth: int = 4  #: hidden layers of the trunk.
-    width: int = 128  #: of each.
-    octaves: int = 7  #: of the place's encoding.
-    turns: int = 4  #: octaves of the view's and the light's.
-    samples: int = 128  #: of a ray.
-    places: int = 1_000_000  #: beside the surface that are learned from.
-    steps: int = 800  #: of Adam; its rate falls to zero as half a cosine.
-    batch: int = 8192  #: places in a step, and half as many of the whole ball.
-    rate: float = 3e-3  #: of the first steps.
-    opacity: float = 0.05  #: weight of the density's error beside the colour's.
 
 
 FIELD: Final = FieldSpec()
@@ -99,12 +83,12 @@ class ViewBench:
     @cached_property
     def identity(self) -> str:
         """Of the reference's pictures and where they were taken."""
-        eyes = [[camera.eye, light.direction] for camera, light in self._pairs]
-        return digest([*eyes, *self.references])
+        views = map(self.view, range(self.count))
+        return digest([*([camera.eye, light.direction] for camera, light in views), *self.references])
 
-    @property
-    def _pairs(self) -> "zip[tuple[Pinhole, DirectionalLight]]":
-        return zip(self.views.cameras, self.views.lights, strict=True)
+    def view(self, number: int) -> tuple[Pinhole, DirectionalLight]:
+        """Return the camera and the light of a view."""
+        return self.views.cameras[number], self.views.lights[number]
 
     def scores(self, number: int, rendered: AnyArray) -> Mapping[str, float]:
         """PSNR and SSIM of the whole picture."""
@@ -266,8 +250,23 @@ def look_methods(bench: ViewBench, of: ObjectFile, work: RenderingWork) -> list[
         of: the object; its own networks are rows where it has some.
         work: where networks are stored.
     """
+    white = MadeMethod(lambda _: np.full((SIZE, SIZE, 3), 255, np.uint8))
+    entry = of.description.vision
+    own = (
+        []
+        if entry is None
+        else [
+            RenderingMethod(
+                f"networks of the ObjectFile, {name}",
+                column,
+                (entry.network.sha256, asdict(settings)),
+                partial(_by_networks, bench, of, settings),
+            )
+            for name, column, settings in _SETTINGS
+        ]
+    )
     return [
-        RenderingMethod("white alone", "other", (), _white, "costs nothing"),
+        RenderingMethod("white alone", "other", (), lambda: white, "costs nothing"),
         RenderingMethod(
             "one field, samples evenly (1.0)",
             "1.0 here",
@@ -282,7 +281,7 @@ def look_methods(bench: ViewBench, of: ObjectFile, work: RenderingWork) -> list[
             lambda: _by_cells(bench, work),
             f"its networks and inputs, {KILO_OSF.steps} steps each, {CellFields.samples} samples a ray",
         ),
-        *_own(bench, of),
+        *own,
         RenderingMethod(
             "the mesh itself, 2 x 2 rays a pixel",
             "other",
@@ -293,67 +292,34 @@ def look_methods(bench: ViewBench, of: ObjectFile, work: RenderingWork) -> list[
     ]  # fmt: skip
 
 
-def _white() -> MadeMethod:
-    return MadeMethod(lambda _: np.full((SIZE, SIZE, 3), 255, np.uint8))
-
-
 def _by_field(bench: ViewBench, work: RenderingWork) -> MadeMethod:
-    train = partial(train_network, "train_field", bench, FIELD, work.report)
-    identity = ("field", bench.identity, astuple(FIELD))
-    data, seconds = stored_graph(work.store, identity, "the field of 1.0", train)
+    data, seconds = train_network(work, "field", "the field of 1.0", bench, FIELD, bench.identity)
     field = opened_field(data, bench.lit.appearance.mesh, FIELD.samples)
-
-    def observe(number: int) -> AnyArray:
-        return field.picture(bench.views.cameras[number], bench.views.lights[number])
-
-    return MadeMethod(observe, seconds)
+    return MadeMethod(lambda number: field.picture(*bench.view(number)), seconds)
 
 
 def _by_cells(bench: ViewBench, work: RenderingWork) -> MadeMethod:
     def train() -> bytes:
         with TemporaryDirectory() as folder:
             checkpoint = Path(folder) / "cells.npz"
-            model = train_networks(
-                bench.lit, bench.views, KILO_OSF, _SEED, checkpoint, work.report, 1
-            ).finish()
+            networks = train_networks(bench.lit, bench.views, KILO_OSF, _SEED, checkpoint, work.report, 1)
+            model = networks.finish()
         return vision_graph(model).SerializeToString()
 
     identity = ("kilo osf", bench.identity, asdict(KILO_OSF.size), *astuple(KILO_OSF)[1:])
     data, seconds = stored_graph(work.store, identity, "KiloOSF", train, torch=False)
     fields = CellFields(VisionNetworks(data), bench.lit.appearance.mesh, KILO_OSF.cells)
-
-    def observe(number: int) -> AnyArray:
-        return fields.picture(bench.views.cameras[number], bench.views.lights[number])
-
-    return MadeMethod(observe, seconds)
+    return MadeMethod(lambda number: fields.picture(*bench.view(number)), seconds)
 
 
-def _own(bench: ViewBench, of: ObjectFile) -> list[RenderingMethod]:
-    entry = of.description.vision
-    if entry is None:
-        return []
-    rows = []
-    for name, column, settings in _SETTINGS:
-
-        def make(settings: RenderSettings = settings) -> MadeMethod:
-            return MadeMethod(_pictures(bench, open_vision(of, 1).renderer, settings))
-
-        identity = (entry.network.sha256, asdict(settings))
-        rows.append(RenderingMethod(f"networks of the ObjectFile, {name}", column, identity, make))
-    return rows
-
-
-def _pictures(bench: ViewBench, renderer: VisionRenderer, settings: RenderSettings) -> Render:
-    def observe(number: int) -> AnyArray:
-        camera, light = bench.views.cameras[number], bench.views.lights[number]
-        return shown(renderer.render(camera, light, settings).image)
-
-    return observe
+def _by_networks(bench: ViewBench, of: ObjectFile, settings: RenderSettings) -> MadeMethod:
+    renderer = open_vision(of, 1).renderer
+    return MadeMethod(lambda number: shown(renderer.render(*bench.view(number), settings).image))
 
 
 def _by_mesh(bench: ViewBench) -> MadeMethod:
     def observe(number: int) -> AnyArray:
-        camera, light = bench.views.cameras[number], bench.views.lights[number]
+        camera, light = bench.view(number)
         return shown(bench.lit.render(camera, [light], 2).image)
 
     return MadeMethod(observe)

@@ -6,7 +6,8 @@ in a store by all that they depend on.
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from functools import cache
 from importlib.util import find_spec
 from typing import Literal, Protocol
 
@@ -101,6 +102,22 @@ class FitSpec:
     rate: float = 2e-3  #: of the first steps.
 
 
+@dataclass(frozen=True)
+class FieldSpec:
+    """One network for the look of an object, and its training by Adam."""
+
+    depth: int = 4  #: hidden layers of the trunk.
+    width: int = 128  #: of each.
+    octaves: int = 7  #: of the place's encoding.
+    turns: int = 4  #: octaves of the view's and the light's.
+    samples: int = 128  #: of a ray.
+    places: int = 1_000_000  #: beside the surface that are learned from.
+    steps: int = 800  #: of Adam; its rate falls to zero as half a cosine.
+    batch: int = 8192  #: places in a step, and half as many of the whole ball.
+    rate: float = 3e-3  #: of the first steps.
+    opacity: float = 0.05  #: weight of the density's error beside the colour's.
+
+
 GRAPH_VERSION = "baseline graph"
 """Of what trainings compute; another text with every change of it, so that stored networks are dropped."""
 
@@ -109,10 +126,34 @@ class TorchMissing(Exception):
     """A baseline has to be trained, and torch is not installed; its row of the table says so."""
 
 
-def train_network(function: str, *arguments: object) -> bytes:
-    """Train a network by a function of ``rendering_training``, which needs torch and is imported on use."""
-    trained: bytes = loaded(f"experiments.paper.rendering_training:{function}")(*arguments)
-    return trained
+def train_network(
+    work: RenderingWork,
+    name: str,
+    what: str,
+    bench: "RenderingBench",
+    spec: FitSpec | FieldSpec,
+    lesson: str,
+    *settings: object,
+) -> tuple[bytes, float]:
+    """Train a network by ``rendering_training.train_NAME``; see ``stored_graph``.
+
+    Args:
+        work: has the store, and takes progress.
+        name: name of the network.
+        what: its name in messages.
+        bench: the queries that it must not learn from.
+        spec: its layers and their training.
+        lesson: digest of all that it learns from.
+        settings: what else it depends on.
+    """
+
+    def train() -> bytes:
+        trained: bytes = loaded(f"experiments.paper.rendering_training:train_{name}")(
+            bench, spec, work.report
+        )
+        return trained
+
+    return stored_graph(work.store, (name, lesson, astuple(spec), *settings), what, train)
 
 
 def stored_graph(
@@ -169,18 +210,6 @@ class MeasuredMethod:
     missing: str = ""  #: why it could not be made; empty where it was.
 
 
-class _Workshop:
-    """Methods made when they are first used."""
-
-    def __init__(self) -> None:
-        self._made: dict[str, MadeMethod] = {}
-
-    def made(self, method: RenderingMethod) -> MadeMethod:
-        if method.name not in self._made:
-            self._made[method.name] = method.make()
-        return self._made[method.name]
-
-
 def measure_sense(
     bench: RenderingBench, methods: Sequence[RenderingMethod], work: RenderingWork
 ) -> Iterator[MeasuredMethod]:
@@ -194,13 +223,18 @@ def measure_sense(
         methods: with names that differ.
         work: where cells are stored.
     """
-    workshop, worth = _Workshop(), {}
+    worth: dict[str, Mapping[str, FloatArray]] = {}
     missing: dict[str, str] = {}
+
+    @cache
+    def make(method: RenderingMethod) -> MadeMethod:
+        return method.make()
+
     with threadpool_limits(limits=1):
         for number, method in enumerate(methods):
             work.report(f"{bench.sense}: {method.name}", number / len(methods))
             try:
-                worth[method.name] = _quality(bench, method, workshop, work)
+                worth[method.name] = _quality(bench, method, make, work)
             except TorchMissing as reason:
                 missing[method.name] = str(reason)
         work.report(f"{bench.sense}: seconds", 1.0)
@@ -211,7 +245,7 @@ def measure_sense(
         if isinstance(stored, Mapping):
             timed = {name.removeprefix("of "): seconds for name, seconds in stored.items()}
         else:
-            timed = timed_in_turn({each.name: workshop.made(each) for each in rendered}, bench.count)
+            timed = timed_in_turn({each.name: make(each) for each in rendered}, bench.count)
             work.store.put(key, {f"of {name}": seconds for name, seconds in timed.items()})
     for method in methods:
         if method.name in missing:
@@ -223,14 +257,17 @@ def measure_sense(
 
 
 def _quality(
-    bench: RenderingBench, method: RenderingMethod, workshop: _Workshop, work: RenderingWork
+    bench: RenderingBench,
+    method: RenderingMethod,
+    make: Callable[[RenderingMethod], MadeMethod],
+    work: RenderingWork,
 ) -> Mapping[str, FloatArray]:
     """``(n,)`` of each metric, and ``made_s``."""
     key = digest(["rendering quality", VERSION, bench.identity, method.name, list(method.identity)])
     stored = work.store.get(key)
     if isinstance(stored, Mapping):
         return stored
-    made = workshop.made(method)
+    made = make(method)
     rows = [bench.scores(number, made.render(number)) for number in range(bench.count)]
     found = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     found["made_s"] = np.array(made.seconds)

@@ -4,7 +4,6 @@ They take a crop of one picture, the spectrogram of one strike, or imprints in o
 the camera was, what the object is made of, or where the arm was.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from scipy.fft import rfft, rfftfreq
 
 from experiments.scale_estimation.unseen import contact_set
 from experiments.scale_estimation.unseen.network import reading_input
+from harness.authoring.network_program import read_networks
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray
 from harness.basics.errors import DataRefused, FitRefused
 from harness.objectfile.entries import Tensor
@@ -155,7 +155,6 @@ class PaperNetwork:
     """A trained network."""
 
     network: Network  #: that runs it.
-    card: Mapping[str, object]  #: where it comes from and what it reaches.
 
     def size(self, views: Sequence[Mapping[str, FloatArray]]) -> float:
         """M: the geometric mean of the sizes of one or more readings of one object.
@@ -181,35 +180,15 @@ class PaperNetwork:
 
 
 def paper_networks(folder: Path) -> dict[str, PaperNetwork]:
-    """All of the paper's networks that lie in a folder, by sense.
+    """Open the paper's networks of a folder, by sense.
 
     Raises:
-        DataRefused: there is none, a card is missing or no JSON, or a graph must not be run.
+        DataRefused: there is none, a card is missing or no JSON, or a graph must not be run or is not of its
+            sense.
     """
-    found = {
-        sense: opened_paper(folder, sense) for sense in SIZE_INPUTS if (folder / f"{sense}.onnx").is_file()
-    }
-    if not found:
-        names = ", ".join(f"{sense}.onnx" for sense in SIZE_INPUTS)
-        raise DataRefused(f"{folder} has none of {names}; train them: {_TRAIN}")
-    return found
-
-
-def opened_paper(folder: Path, sense: str) -> PaperNetwork:
-    """One network and its card.
-
-    Args:
-        folder: that a training wrote.
-        sense: of ``SIZE_INPUTS``.
-
-    Raises:
-        DataRefused: a card is missing or no JSON, or the graph must not be run or is not of this sense.
-    """
-    path = folder / f"{sense}.onnx"
-    try:
-        card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise DataRefused(f"{path} has no card beside it; train it again: {_TRAIN}") from error
-    inputs = [reading_input(name, shape, _GREATEST) for name, shape in SIZE_INPUTS[sense]]
     size = Tensor(name="log_size", dtype="float32", shape=("n", 1), unit="1", meaning="log of the size in m")
-    return PaperNetwork(Network(path.read_bytes(), path.name, inputs, [size]), card)
+    found = {}
+    for sense, data in read_networks(folder, SIZE_INPUTS, _TRAIN).items():
+        inputs = [reading_input(name, shape, _GREATEST) for name, shape in SIZE_INPUTS[sense]]
+        found[sense] = PaperNetwork(Network(data, f"{sense}.onnx", inputs, [size]))
+    return found

@@ -238,9 +238,6 @@ def _area(extents: FloatArray) -> float:
     return float(0.5 * np.sum(extents * sides))
 
 
-_Views = list[dict[str, FloatArray]]
-
-
 @dataclass(frozen=True, eq=False)
 class PaperReadings:
     """The readings of a run as the paper has them: no poses, no material."""
@@ -251,31 +248,23 @@ class PaperReadings:
     strikes: Sequence[Strike]  #: all that were made.
     patches: Sequence[Patch]  #: of the contacts that met the object, in their order.
 
-    def views(self, sense: str) -> _Views:
-        """The inputs of a sense's network, one or more.
+    def views(self, sense: str) -> list[dict[str, FloatArray]]:
+        """Compute the inputs of a sense's network, one or more.
 
         Raises:
             FitRefused: the run has no reading of the sense.
         """
-        made: dict[str, Callable[[], _Views]] = {
-            "picture": self._crop, "spectrogram": self._spectrograms, "imprints": self._sequence,
-        }  # fmt: skip
-        return made[sense]()
-
-    def _crop(self) -> _Views:
-        if self.pictures is None:
-            raise FitRefused("the camera has not looked yet")
-        live, bare = self.pictures
-        return [{"crop": crop_of(live, mask_by_background(live, bare), self.focal_px)}]
-
-    def _spectrograms(self) -> _Views:
-        found = response_of(self.strikes)
-        if found is None:
-            raise FitRefused("no strike may be used: none was made, or none excited anything")
-        responses, rate, band = found
-        return [{"spectrogram": spectrogram_of(response, rate, band)} for response in responses]
-
-    def _sequence(self) -> _Views:
+        if sense == "picture":
+            if self.pictures is None:
+                raise FitRefused("the camera has not looked yet")
+            live, bare = self.pictures
+            return [{"crop": crop_of(live, mask_by_background(live, bare), self.focal_px)}]
+        if sense == "spectrogram":
+            found = response_of(self.strikes)
+            if found is None:
+                raise FitRefused("no strike may be used: none was made, or none excited anything")
+            responses, rate, band = found
+            return [{"spectrogram": spectrogram_of(response, rate, band)} for response in responses]
         rows, last = sequence_of([patch.points for patch in self.patches])
         return [{"imprints": rows, "last": last}]
 

@@ -1,6 +1,5 @@
 """The paper's completion networks: touched points, the silhouette, or both, to points all over the object."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,8 +18,9 @@ from experiments.shape_reconstruction.prior.network import (
     window_of,
 )
 from experiments.shape_reconstruction.smooth.free_space import all_samples
+from harness.authoring.network_program import read_networks
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import DataRefused, FitRefused, OutOfDomain
+from harness.basics.errors import FitRefused, OutOfDomain
 from harness.objectfile.runtime import Network
 
 TAKEN = 1024
@@ -119,17 +119,8 @@ def paper_completions(folder: Path) -> list[PaperCompletion]:
         DataRefused: the folder has none, a card is missing or no JSON, or a graph must not be run.
     """
     found = []
-    for sense, inputs in INPUTS.items():
-        path = folder / f"{sense}.onnx"
-        if path.is_file():
-            try:
-                json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
-            except (OSError, ValueError) as error:
-                raise DataRefused(f"{path} has no card beside it; train it again: {_TRAIN}") from error
-            described = [_DESCRIBED[name] for name, _ in inputs]
-            network = Network(path.read_bytes(), path.name, described, [network_output(DENSE)])
-            found.append(PaperCompletion(sense, network))
-    if not found:
-        names = ", ".join(f"{sense}.onnx" for sense in INPUTS)
-        raise DataRefused(f"{folder} has none of {names}; train them: {_TRAIN}")
+    for sense, data in read_networks(folder, INPUTS, _TRAIN).items():
+        described = [_DESCRIBED[name] for name, _ in INPUTS[sense]]
+        network = Network(data, f"{sense}.onnx", described, [network_output(DENSE)])
+        found.append(PaperCompletion(sense, network))
     return found

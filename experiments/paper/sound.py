@@ -24,7 +24,6 @@ from experiments.paper.rendering import (
     RenderingMethod,
     RenderingWork,
     Sense,
-    stored_graph,
     train_network,
 )
 from harness.authoring.audio.audio import opened, waves_graph
@@ -144,10 +143,6 @@ _UP, _DOWN = 441, 160
 """From 16 kHz to 44.1 kHz."""
 
 _AT_ONCE = 16384
-SPECTRUM_INPUTS = 5
-SPECTRUM_OUTPUTS = 6
-"""Real parts for x, y, z, then imaginary parts."""
-
 SPECTRUM_FILE = "audio_spectrum.onnx"
 
 
@@ -195,41 +190,12 @@ def sound_of_spectrum(spectrum: AnyArray) -> FloatArray:
     return np.pad(faster, (0, round(DURATION * RATE) - len(faster)))
 
 
-@dataclass(frozen=True, eq=False)
-class SpectrumNetwork:
-    """The trained network, ready to be queried."""
-
-    network: Network  #: five numbers of a bin to six.
-    low: FloatArray  #: ``(3,)`` m, of the box in which places are 0 to 1.
-    high: FloatArray  #: ``(3,)`` m.
-    basis: SpectrumBasis  #: gives the bins.
-
-    def sound(self, point: FloatArray, normal: FloatArray) -> FloatArray:
-        """``(t,)``: what a unit impulse along ``(3,)`` a normal at ``(3,)`` a place sounds like."""
-        rows = np.empty((len(self.basis.places), SPECTRUM_INPUTS))
-        rows[:, :3], rows[:, 3:] = (point - self.low) / (self.high - self.low), self.basis.places
-        runs = [
-            self.network({"place": rows[k : k + _AT_ONCE]})["spectrum"] for k in range(0, len(rows), _AT_ONCE)
-        ]
-        values = np.concatenate(runs).astype(np.float64)
-        along = values[:, :3] @ normal + 1j * (values[:, 3:] @ normal)
-        return sound_of_spectrum(along.reshape(self.basis.bins))
-
-
 def spectrum_pair() -> tuple[Input, Tensor]:
-    """What the network takes and gives."""
-    box = Domain(low=(0.0,) * SPECTRUM_INPUTS, high=(1.0,) * SPECTRUM_INPUTS)
-    place = graph_input(
-        "place", "float64", ("n", SPECTRUM_INPUTS), "1", "x y z, frequency, time: 0 to 1", box
-    )
-    spectrum = Tensor(
-        name="spectrum",
-        dtype="float32",
-        shape=("n", SPECTRUM_OUTPUTS),
-        unit="s/sqrt(kg)",
-        meaning="real parts for unit forces along x, y, z, then imaginary ones",
-    )
-    return place, spectrum
+    """Describe the input and the output tensor of the network."""
+    box = Domain(low=(0.0,) * 5, high=(1.0,) * 5)
+    place = graph_input("place", "float64", ("n", 5), "1", "x y z, frequency, time: 0 to 1", box)
+    meaning, unit = "real parts for unit forces along x, y, z, then imaginary ones", "s/sqrt(kg)"
+    return place, Tensor(name="spectrum", dtype="float32", shape=("n", 6), unit=unit, meaning=meaning)
 
 
 ANYWHERE = 1.0
@@ -243,15 +209,19 @@ _PROFILES: tuple[tuple[str, Column], ...] = (
 
 
 def sound_methods(bench: StrikeBench, work: RenderingWork) -> list[RenderingMethod]:
-    """Every row of sound.
-
-    Args:
-        bench: of the strikes.
-        work: where networks are stored.
-    """
-    ours = [_profile(bench, name, column) for name, column in _PROFILES]
+    """Return every row of sound."""
+    silence = np.zeros(round(DURATION * RATE))
+    ours = [
+        RenderingMethod(
+            f"modes, gains by waves, profile {name}",
+            column,
+            astuple(PROFILES[name].network),
+            partial(_by_waves, bench, PROFILES[name].network),
+        )
+        for name, column in _PROFILES
+    ]
     return [
-        RenderingMethod("silence", "other", (), lambda: _silence(bench), "costs nothing"),
+        RenderingMethod("silence", "other", (), lambda: MadeMethod(lambda _: silence), "costs nothing"),
         RenderingMethod(
             "spectrogram AudioNet (1.0)",
             "1.0 here",
@@ -284,17 +254,6 @@ def sound_methods(bench: StrikeBench, work: RenderingWork) -> list[RenderingMeth
     ]
 
 
-def _profile(bench: StrikeBench, name: str, column: Column) -> RenderingMethod:
-    spec = PROFILES[name].network
-    row = f"modes, gains by waves, profile {name}"
-    return RenderingMethod(row, column, astuple(spec), lambda: _by_waves(bench, spec))
-
-
-def _silence(bench: StrikeBench) -> MadeMethod:
-    samples = len(bench.reference(0))
-    return MadeMethod(lambda _: np.zeros(samples))
-
-
 def _by_waves(bench: StrikeBench, spec: WavesSpec) -> MadeMethod:
     modes, begun = bench.modes, time.process_time()
     trained = bench.split.trained
@@ -305,9 +264,8 @@ def _by_waves(bench: StrikeBench, spec: WavesSpec) -> MadeMethod:
 
 
 def _by_audionet(bench: StrikeBench, work: RenderingWork) -> MadeMethod:
-    train = partial(train_network, "train_audionet", bench, AUDIONET, work.report)
-    identity = ("audionet", bench.lesson, astuple(AUDIONET), AUDIONET_EPOCHS)
-    data, seconds = stored_graph(work.store, identity, "AudioNet", train)
+    lesson, settings = bench.lesson, AUDIONET_EPOCHS
+    data, seconds = train_network(work, "audionet", "AudioNet", bench, AUDIONET, lesson, settings)
     points, gains = network_tensors(len(bench.modes.frequencies), ANYWHERE)
     return MadeMethod(_by_gains(bench, Network(data, NETWORK, [points], [gains])), seconds)
 
@@ -322,15 +280,23 @@ def _by_gains(bench: StrikeBench, network: Network) -> Render:
 
 
 def _by_spectrogram(bench: StrikeBench, work: RenderingWork) -> MadeMethod:
-    train = partial(train_network, "train_spectrogram", bench, SPECTROGRAM, work.report)
-    identity = ("spectrogram", bench.lesson, astuple(SPECTROGRAM))
-    data, seconds = stored_graph(work.store, identity, "the spectrogram network", train)
+    what = "the spectrogram network"
+    data, seconds = train_network(work, "spectrogram", what, bench, SPECTROGRAM, bench.lesson)
     place, spectrum = spectrum_pair()
+    network, basis = Network(data, SPECTRUM_FILE, [place], [spectrum]), SpectrumBasis.of(bench)
     low, high = bench.mesh.bounds
-    network = SpectrumNetwork(
-        Network(data, SPECTRUM_FILE, [place], [spectrum]), low, high, SpectrumBasis.of(bench)
-    )
-    return MadeMethod(lambda number: network.sound(*bench.strike(number)), seconds)
+
+    def sound(number: int) -> FloatArray:
+        point, normal = bench.strike(number)
+        rows = np.empty((len(basis.places), 5))
+        rows[:, :3], rows[:, 3:] = (point - low) / (high - low), basis.places
+        starts = range(0, len(rows), _AT_ONCE)
+        runs = [network({"place": rows[k : k + _AT_ONCE]})["spectrum"] for k in starts]
+        values = np.concatenate(runs).astype(np.float64)
+        along = values[:, :3] @ normal + 1j * (values[:, 3:] @ normal)
+        return sound_of_spectrum(along.reshape(basis.bins))
+
+    return MadeMethod(sound, seconds)
 
 
 def _exact_spectrogram(bench: StrikeBench) -> MadeMethod:

@@ -8,7 +8,7 @@ are the sensor's of all rows of the table.
 import time
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Final, Literal, Self
 
 import numpy as np
@@ -22,7 +22,6 @@ from experiments.paper.rendering import (
     RenderingWork,
     Sense,
     picture_scores,
-    stored_graph,
     train_network,
 )
 from harness.authoring.touch.data import (
@@ -163,29 +162,7 @@ def touch_bench(
     return TouchBench(places, drawn[chosen], reference.maps[chosen], calibration)
 
 
-COLOUR_INPUTS = 5
-CHANNELS = 3
 COLOURS_FILE = "touch_colours.onnx"
-
-
-@dataclass(frozen=True, eq=False)
-class ColourNetwork:
-    """The trained network, ready to be queried."""
-
-    network: Network  #: five numbers of a pixel to a colour of -1 .. 1.
-    low: FloatArray  #: ``(3,)`` m, of the box in which places are 0 to 1.
-    high: FloatArray  #: ``(3,)`` m.
-    shape: tuple[int, int]  #: rows and columns of a picture.
-
-    def picture(self, point: FloatArray) -> ByteArray:
-        """``(rows, columns, 3)`` of the press at a ``(3,)`` place in m."""
-        place = np.broadcast_to(
-            (point - self.low) / (self.high - self.low), (self.shape[0] * self.shape[1], 3)
-        )
-        rows = np.concatenate([place, pixel_places(self.shape)], axis=1)
-        found = self.network({"place": rows})["colours"]
-        grey = np.clip(np.rint(127.5 * (found + 1.0)), 0.0, 255.0)
-        return grey.astype(np.uint8).reshape(*self.shape, CHANNELS)
 
 
 def pixel_places(shape: tuple[int, int]) -> FloatArray:
@@ -196,20 +173,13 @@ def pixel_places(shape: tuple[int, int]) -> FloatArray:
 
 def colours_pair() -> tuple[Input, Tensor]:
     """Describe the input and the output tensor of the network."""
-    box = Domain(low=(0.0, 0.0, 0.0, -1.0, -1.0), high=(1.0,) * COLOUR_INPUTS)
+    box = Domain(low=(0.0, 0.0, 0.0, -1.0, -1.0), high=(1.0,) * 5)
     meaning = "x y z, 0 to 1; row and column, -1 to 1"
-    place = graph_input("place", "float64", ("n", COLOUR_INPUTS), "1", meaning, box)
-    colours = Tensor(
-        name="colours",
-        dtype="float32",
-        shape=("n", CHANNELS),
-        unit="1",
-        meaning="red green blue, -1 to 1",
-    )
-    return place, colours
+    place = graph_input("place", "float64", ("n", 5), "1", meaning, box)
+    meaning = "red green blue, -1 to 1"
+    return place, Tensor(name="colours", dtype="float32", shape=("n", 3), unit="1", meaning=meaning)
 
 
-PRESS_INPUTS = 9
 TOUCHNET_FILE = "touch_perceptron.onnx"
 
 
@@ -236,7 +206,7 @@ class PressInputs:
 
     def rows(self, presses: Presses, pixels: IntArray) -> FloatArray:
         """Return ``(k, 9)`` inputs for ``(k,)`` row-major pixel indices, one press each or one for all."""
-        rows = np.empty((len(pixels), PRESS_INPUTS))
+        rows = np.empty((len(pixels), 9))
         rows[:, :3], rows[:, 3] = presses.points, presses.tilts
         rows[:, 4], rows[:, 5] = np.cos(presses.azimuths), np.sin(presses.azimuths)
         rows[:, 6] = presses.depths
@@ -246,17 +216,11 @@ class PressInputs:
 
 def touchnet_pair() -> tuple[Input, Tensor]:
     """Describe the input and the output tensor of the network."""
-    box = Domain(low=(0.0,) * 4 + (-1.0,) * 2 + (0.0,) * 3, high=(1.0,) * PRESS_INPUTS)
+    box = Domain(low=(0.0,) * 4 + (-1.0,) * 2 + (0.0,) * 3, high=(1.0,) * 9)
     meaning = "place x y z, tilt, cosine and sine of its azimuth, depth, row, column"
-    pixel = graph_input("pixel", "float64", ("n", PRESS_INPUTS), "1", meaning, box)
-    depth = Tensor(
-        name="depth",
-        dtype="float32",
-        shape=("n", 1),
-        unit="m",
-        meaning="how far the gel is pressed in",
-    )
-    return pixel, depth
+    pixel = graph_input("pixel", "float64", ("n", 9), "1", meaning, box)
+    meaning = "how far the gel is pressed in"
+    return pixel, Tensor(name="depth", dtype="float32", shape=("n", 1), unit="m", meaning=meaning)
 
 
 _REACH = 2.0
@@ -264,26 +228,46 @@ _REACH = 2.0
 
 
 def first_touch(bench: TouchBench, work: RenderingWork, suffix: str = "") -> RenderingMethod:
-    """1.0's network.
+    """Return 1.0's network, trained at the bench's training points; ``suffix`` is added to its name."""
 
-    Args:
-        bench: on which it is measured; it learns at the bench's places.
-        work: where it is stored.
-        suffix: added to its name.
-    """
+    def make() -> MadeMethod:
+        what, shape = "the tactile network of 1.0", (bench.places.sensor.rows, bench.places.sensor.columns)
+        data, seconds = train_network(work, "colours", what, bench, COLOURS, bench.lesson)
+        place, colours = colours_pair()
+        network, (low, high) = Network(data, COLOURS_FILE, [place], [colours]), bench.places.mesh.bounds
+
+        def picture(number: int) -> ByteArray:
+            point = (bench.presses.points[number] - low) / (high - low)
+            pixels = pixel_places(shape)
+            rows = np.concatenate([np.broadcast_to(point, (len(pixels), 3)), pixels], axis=1)
+            grey = np.clip(np.rint(127.5 * (network({"place": rows})["colours"] + 1.0)), 0.0, 255.0)
+            return grey.astype(np.uint8).reshape(*shape, 3)
+
+        return MadeMethod(picture, seconds)
+
     column: Column = "other" if suffix else "1.0 here"
     note = "one picture a place, whatever the tilt and depth"
-    return RenderingMethod(
-        f"DIGIT-like TouchNet (1.0){suffix}", column, astuple(COLOURS), lambda: _by_colours(bench, work), note
-    )  # fmt: skip
+    return RenderingMethod(f"DIGIT-like TouchNet (1.0){suffix}", column, astuple(COLOURS), make, note)
 
 
 def second_touch(bench: TouchBench, work: RenderingWork) -> RenderingMethod:
-    """2.0's network."""
+    """Return 2.0's network, trained at the bench's training points."""
+
+    def make() -> MadeMethod:
+        what, settings = "TouchNet", TOUCHNET_PRESSES
+        data, seconds = train_network(work, "touchnet", what, bench, TOUCHNET, bench.lesson, settings)
+        pixel, depth = touchnet_pair()
+        network = Network(data, TOUCHNET_FILE, [pixel], [depth])
+        inputs, shape = PressInputs.of(bench.places), bench.maps.shape[1:]
+        pixels = np.arange(bench.maps[0].size)
+
+        def maps(presses: Presses) -> AnyArray:
+            return network({"pixel": inputs.rows(presses, pixels)})["depth"].reshape(1, *shape)
+
+        return MadeMethod(_drawn(bench, maps), seconds)
+
     note = f"its layers; trained here for {TOUCHNET.steps} steps alone"
-    return RenderingMethod(
-        "TouchNet (2.0)", "2.0 here", astuple(TOUCHNET), lambda: _by_touchnet(bench, work), note
-    )
+    return RenderingMethod("TouchNet (2.0)", "2.0 here", astuple(TOUCHNET), make, note)
 
 
 def untouched(bench: TouchBench, suffix: str = "") -> RenderingMethod:
@@ -294,13 +278,7 @@ def untouched(bench: TouchBench, suffix: str = "") -> RenderingMethod:
 
 
 def touch_methods(bench: TouchBench, of: ObjectFile, work: RenderingWork) -> list[RenderingMethod]:
-    """Every row of touch.
-
-    Args:
-        bench: of the presses.
-        of: the object; its own codes are a row where it has some.
-        work: where networks are stored.
-    """
+    """Return every row of touch; the codes of the object are a row if it has some."""
     largest = TOUCH_PROFILES["standard"].codes
     own, entry = [], of.description.touch
     if entry is not None and entry.codes is not None:
@@ -332,42 +310,14 @@ def touch_methods(bench: TouchBench, of: ObjectFile, work: RenderingWork) -> lis
 
 
 def _codes(name: str, spec: CodesSpec, column: Column, bench: TouchBench) -> RenderingMethod:
-    return RenderingMethod(name, column, astuple(spec), lambda: _by_codes(bench, spec))
+    def make() -> MadeMethod:
+        places, begun = bench.places, time.process_time()
+        coded, spacing = spaced_codes(places.raster, places.sensor, spec, NETWORK_SEED)
+        graph = codes_graph(coded.patches, places.sensor, places.skirt)
+        maps = opened_codes(graph, coded.nodes, _REACH * spacing, places.sensor)
+        return MadeMethod(_drawn(bench, maps), time.process_time() - begun)
 
-
-def _by_codes(bench: TouchBench, spec: CodesSpec) -> MadeMethod:
-    places, begun = bench.places, time.process_time()
-    coded, spacing = spaced_codes(places.raster, places.sensor, spec, NETWORK_SEED)
-    graph = codes_graph(coded.patches, places.sensor, places.skirt)
-    maps = opened_codes(graph, coded.nodes, _REACH * spacing, places.sensor)
-    return MadeMethod(_drawn(bench, maps), time.process_time() - begun)
-
-
-def _by_touchnet(bench: TouchBench, work: RenderingWork) -> MadeMethod:
-    train = partial(train_network, "train_touchnet", bench, TOUCHNET, work.report)
-    identity = ("touchnet", bench.lesson, astuple(TOUCHNET), TOUCHNET_PRESSES)
-    data, seconds = stored_graph(work.store, identity, "TouchNet", train)
-    pixel, depth = touchnet_pair()
-    network = Network(data, TOUCHNET_FILE, [pixel], [depth])
-    inputs, shape = PressInputs.of(bench.places), bench.maps.shape[1:]
-    pixels = np.arange(bench.maps[0].size)
-
-    def maps(presses: Presses) -> AnyArray:
-        return network({"pixel": inputs.rows(presses, pixels)})["depth"].reshape(1, *shape)
-
-    return MadeMethod(_drawn(bench, maps), seconds)
-
-
-def _by_colours(bench: TouchBench, work: RenderingWork) -> MadeMethod:
-    train = partial(train_network, "train_colours", bench, COLOURS, work.report)
-    places = bench.places
-    identity = ("colours", bench.lesson, astuple(COLOURS))
-    data, seconds = stored_graph(work.store, identity, "the tactile network of 1.0", train)
-    place, colours = colours_pair()
-    low, high = places.mesh.bounds
-    shape = places.sensor.rows, places.sensor.columns
-    network = ColourNetwork(Network(data, COLOURS_FILE, [place], [colours]), low, high, shape)
-    return MadeMethod(lambda number: network.picture(bench.presses.points[number]), seconds)
+    return RenderingMethod(name, column, astuple(spec), make)
 
 
 def _drawn(bench: TouchBench, maps: Maps) -> Render:

@@ -4,13 +4,13 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from harness.basics.cores import own_cores
-from harness.basics.errors import WrongUse
+from harness.basics.errors import DataRefused, WrongUse
 
 DEVICES = ("auto", "cpu", "cuda")
 """Processors that a network is fitted on; ``"auto"``: cuda where there is one."""
@@ -106,3 +106,28 @@ def write_network(
     (folder / f"{name}.json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
     printed = {key: card[key] for key in ("held_out", "cpu_seconds", "seconds", "device") if key in card}
     sys.stdout.write(f"{name}: {json.dumps(printed)}\n")
+
+
+def read_networks(folder: Path, names: Iterable[str], train: str) -> dict[str, bytes]:
+    """Read the graphs that ``write_network`` wrote to a folder, by name; some of them may be missing.
+
+    Args:
+        folder: folder of the files.
+        names: names of the networks.
+        train: command that trains them, for messages.
+
+    Raises:
+        DataRefused: there is none, or a card is missing or no JSON.
+    """
+    found = {}
+    for path in [folder / f"{name}.onnx" for name in names]:
+        if path.is_file():
+            try:
+                json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+            except (OSError, ValueError) as error:
+                raise DataRefused(f"{path} has no card beside it; train it again: {train}") from error
+            found[path.stem] = path.read_bytes()
+    if not found:
+        files = ", ".join(f"{name}.onnx" for name in names)
+        raise DataRefused(f"{folder} has none of {files}; train them: {train}")
+    return found

@@ -15,15 +15,40 @@ _FIRST = 7
 _EACH = 2
 
 
+class Convolution(nn.Module):
+    """Convolution and batch normalisation, initialised after He et al. 2015 (Delving deep)."""
+
+    def __init__(self, before: int, channels: int, side: int, stride: int) -> None:
+        super().__init__()
+        self.kernel = nn.Conv2d(before, channels, side, stride, side // 2, bias=False)
+        nn.init.kaiming_normal_(self.kernel.weight, mode="fan_out", nonlinearity="relu")
+        self.normalisation = nn.BatchNorm2d(channels)
+
+    def forward(self, given: Tensor) -> Tensor:
+        """``(n, channels, rows / stride, columns / stride)``."""
+        return self.normalisation(self.kernel(given))
+
+    def write(self, nodes: Nodes, value: str) -> str:
+        """Write one layer to a graph: a trained normalisation scales and shifts each channel."""
+        kernel, normalisation = self.kernel, self.normalisation
+        mean, variance = (normalisation.get_buffer(name) for name in ("running_mean", "running_var"))
+        factor = (normalisation.weight / torch.sqrt(variance + normalisation.eps)).detach().numpy()
+        weight = nodes.weight(kernel.weight.detach().numpy() * factor[:, None, None, None], "a convolution")
+        shift = normalisation.bias.detach().numpy() - factor * mean.numpy()
+        bias = nodes.weight(np.asarray(shift), "a convolution")
+        half, stride = kernel.kernel_size[0] // 2, kernel.stride[0]
+        return nodes.add("Conv", value, weight, bias, strides=[stride] * 2, pads=[half] * 4)
+
+
 class ResidualBlock(nn.Module):
-    """Two convolutions of 3 x 3, and what came in added to what they give."""
+    """Two convolutions of 3 x 3, whose output is added to the input."""
 
     def __init__(self, before: int, channels: int, stride: int) -> None:
         super().__init__()
-        self.first = convolution(before, channels, 3, stride)
-        self.second = convolution(channels, channels, 3, 1)
+        self.first = Convolution(before, channels, 3, stride)
+        self.second = Convolution(channels, channels, 3, 1)
         changes = stride != 1 or before != channels
-        self.shortcut = convolution(before, channels, 1, stride) if changes else None
+        self.shortcut = Convolution(before, channels, 1, stride) if changes else None
 
     def forward(self, given: Tensor) -> Tensor:
         """``(n, channels, rows / stride, columns / stride)``."""
@@ -31,10 +56,10 @@ class ResidualBlock(nn.Module):
         return torch.relu(self.second(torch.relu(self.first(given))) + along)
 
     def write(self, nodes: Nodes, given: str) -> str:
-        """The same in a graph."""
-        along = given if self.shortcut is None else written_convolution(nodes, given, self.shortcut)
-        inner = nodes.add("Relu", written_convolution(nodes, given, self.first))
-        return nodes.add("Relu", nodes.add("Add", written_convolution(nodes, inner, self.second), along))
+        """Write the layers to a graph."""
+        along = given if self.shortcut is None else self.shortcut.write(nodes, given)
+        inner = nodes.add("Relu", self.first.write(nodes, given))
+        return nodes.add("Relu", nodes.add("Add", self.second.write(nodes, inner), along))
 
 
 class ResNet18(nn.Module):
@@ -47,7 +72,7 @@ class ResNet18(nn.Module):
 
     def __init__(self, channels: int, outputs: int) -> None:
         super().__init__()
-        self.first = convolution(channels, STAGES[0], _FIRST, 2)
+        self.first = Convolution(channels, STAGES[0], _FIRST, 2)
         self.pool = nn.MaxPool2d(3, 2, 1)
         blocks = []
         for stage, (before, width) in enumerate(pairwise((STAGES[0], *STAGES))):
@@ -65,8 +90,8 @@ class ResNet18(nn.Module):
         return torch.as_tensor(self.last(found.mean(dim=(2, 3))))
 
     def write(self, nodes: Nodes, picture: str) -> str:
-        """The same in a graph."""
-        found = nodes.add("Relu", written_convolution(nodes, picture, self.first))
+        """Write the layers to a graph."""
+        found = nodes.add("Relu", self.first.write(nodes, picture))
         found = nodes.add("MaxPool", found, kernel_shape=[3, 3], strides=[2, 2], pads=[1, 1, 1, 1])
         for block in self.blocks:
             found = block.write(nodes, found)
@@ -75,29 +100,6 @@ class ResNet18(nn.Module):
 
 
 def written_linear(nodes: Nodes, value: str, layer: nn.Linear) -> str:
-    """A linear layer in a graph."""
+    """Write a linear layer to a graph."""
     weight = nodes.weight(layer.weight.detach().numpy().T, "a layer")
     return nodes.add("Gemm", value, weight, nodes.weight(layer.bias.detach().numpy(), "a bias"))
-
-
-def convolution(before: int, channels: int, side: int, stride: int) -> nn.Sequential:
-    """A convolution and its batch's normalisation, begun as He et al. 2015 (Delving deep) begin them."""
-    kernel = nn.Conv2d(before, channels, side, stride, side // 2, bias=False)
-    nn.init.kaiming_normal_(kernel.weight, mode="fan_out", nonlinearity="relu")
-    return nn.Sequential(kernel, nn.BatchNorm2d(channels))
-
-
-def written_convolution(nodes: Nodes, value: str, layer: nn.Sequential) -> str:
-    """Both as one in a graph: at inference a normalisation is a factor and a shift of each channel."""
-    kernel, normalisation = layer[0], layer[1]
-    assert isinstance(kernel, nn.Conv2d)
-    assert isinstance(normalisation, nn.BatchNorm2d)
-    mean, variance = normalisation.running_mean, normalisation.running_var
-    assert mean is not None
-    assert variance is not None
-    factor = (normalisation.weight / torch.sqrt(variance + normalisation.eps)).detach().numpy()
-    weight = nodes.weight(kernel.weight.detach().numpy() * factor[:, None, None, None], "a convolution")
-    shift = normalisation.bias.detach().numpy() - factor * mean.numpy()
-    bias = nodes.weight(np.asarray(shift), "a convolution")
-    half, stride = kernel.kernel_size[0] // 2, kernel.stride[0]
-    return nodes.add("Conv", value, weight, bias, strides=[stride] * 2, pads=[half] * 4)

@@ -21,7 +21,7 @@ from experiments.shape_reconstruction.prior.samples import (
     CompletionSamples,
     look_samples,
 )
-from harness.authoring.resnet import ResidualBlock, convolution, written_convolution
+from harness.authoring.resnet import Convolution, ResidualBlock
 from harness.basics.arrays import FloatArray
 from harness.objectfile.graph import Nodes, float_value
 from harness.sim.solid.household.families import FAMILIES
@@ -41,7 +41,7 @@ class PriorNetwork(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.blocks = nn.ModuleList([ResidualBlock(*widths, 2) for widths in pairwise(CHANNELS)])
-        self.narrow = convolution(CHANNELS[-1], NARROW, 1, 1)
+        self.narrow = Convolution(CHANNELS[-1], NARROW, 1, 1)
         self.decoder = nn.ModuleList(
             [nn.Linear(NARROW * _LAST**2, CODE), nn.Linear(CODE, CODE), nn.Linear(CODE, 3 * POINTS_GIVEN)]
         )
@@ -61,7 +61,7 @@ class PriorNetwork(nn.Module):
         nodes, found = Nodes("float16"), "window"  # of the weights; computed in float32
         for block in self.blocks:
             found = block.write(nodes, found)
-        found = nodes.add("Relu", written_convolution(nodes, found, self.narrow))
+        found = nodes.add("Relu", self.narrow.write(nodes, found))
         hidden = nodes.add("Flatten", found, axis=1)
         for layer in list(self.decoder)[:-1]:
             hidden = nodes.add("Relu", linear(nodes, hidden, layer))

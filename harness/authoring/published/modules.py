@@ -76,7 +76,11 @@ class SkipPerceptron(Trunk):
 
     def forward(self, encoded: Tensor) -> Tensor:
         """``(n, encoded)`` to ``(n, outputs)``."""
-        return self.output_linear(super().forward(encoded))
+        return self.output_linear(self.features(encoded))
+
+    def features(self, encoded: Tensor) -> Tensor:
+        """``(n, encoded)`` to ``(n, width)``, the input of the last layer."""
+        return super().forward(encoded)
 
 
 class ScaledPerceptrons(nn.Module):

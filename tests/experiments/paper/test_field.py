@@ -97,7 +97,8 @@ def test_places_within_a_closed_surface_are_told_from_those_without() -> None:
 
 def test_a_field_that_was_trained_for_seconds_beats_white_alone() -> None:
     pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
-    from experiments.paper.look import FieldSpec, ViewBench, opened_field, shown
+    from experiments.paper.look import ViewBench, opened_field, shown
+    from experiments.paper.rendering import FieldSpec
     from experiments.paper.rendering_training import train_field
     from harness.authoring.vision.data import held_out_pictures
     from harness.authoring.vision.metrics import reference_pictures

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.paper.scale_networks import SIZE_INPUTS, STEPS, opened_paper
+from experiments.paper.scale_networks import SIZE_INPUTS, STEPS, paper_networks
 from experiments.paper.train import main
 
 torch = pytest.importorskip("torch", reason="the extra 'author' is not installed")
@@ -62,7 +62,7 @@ def test_a_graph_answers_as_torch_does(sense: str, tmp_path: Path) -> None:
     (tmp_path / f"{sense}.json").write_text("{}")
     names = [name for name, _ in SIZE_INPUTS[sense]]
     values = [value.numpy() for value in given]
-    found = opened_paper(tmp_path, sense).network(dict(zip(names, values, strict=True)))["log_size"]
+    found = paper_networks(tmp_path)[sense].network(dict(zip(names, values, strict=True)))["log_size"]
     assert found == pytest.approx(wanted, abs=2e-2 * max(1.0, float(np.ptp(wanted))))  # half precision
     assert np.ptp(wanted) > 1e-3
 
@@ -110,6 +110,6 @@ def test_a_smoke_training_ends_in_a_network_and_its_card(
     card = json.loads((tmp_path / "picture.json").read_text())
     assert card["held_out"]["samples"] > 0
     assert card["profile"] == "paper-smoke"
-    network = opened_paper(tmp_path, "picture")
+    network = paper_networks(tmp_path)["picture"]
     size = network.size([{"crop": np.zeros(SIZE_INPUTS["picture"][0][1])}])
     assert 0.0 < size < np.inf
