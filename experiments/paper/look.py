@@ -38,7 +38,7 @@ from harness.basics.errors import DataRefused
 from harness.basics.mesh import Mesh
 from harness.basics.store import digest
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.published.look import FOCAL, SIZE, OsfNetwork, RawField, osf_tensors
+from harness.objectfile.published.look import FOCAL, SIZE, RawField, osf_field, osf_tensors
 from harness.objectfile.published.volume_render import Field, render_rays, stretched_sigmoid
 from harness.objectfile.runtime import Network
 from harness.objectfile.vision.graph import VisionNetworks, vision_graph
@@ -230,7 +230,7 @@ def ball_of(mesh: Mesh) -> tuple[FloatArray, float]:
 def opened_field(data: bytes, mesh: Mesh, samples: int) -> UniformField:
     """The network of a graph, ready for pictures of an object."""
     inputs, outputs = osf_tensors(REACH)
-    return UniformField(OsfNetwork(Network(data, FIELD_FILE, inputs, outputs)).raw, *ball_of(mesh), samples)
+    return UniformField(osf_field(Network(data, FIELD_FILE, inputs, outputs)), *ball_of(mesh), samples)
 
 
 _SEED = 0

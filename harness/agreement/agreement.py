@@ -150,13 +150,9 @@ class Agreement:
 
 
 def judged(about: str, senses: Sequence[SenseResiduals], false_alarm: float = FALSE_ALARM) -> Agreement:
-    """Verdicts of residuals that are each a chi-square where the model is right.
+    """Judge the residuals of each sense, which are chi-squares where the model is right.
 
-    Args:
-        about: the object that was compared with.
-        senses: residuals of each.
-        false_alarm: of the whole run, shared evenly by the senses that are compared, and by the residuals of
-            each (Bonferroni): a sense of many residuals takes nothing from one of few.
+    The senses that are compared share ``false_alarm`` evenly, and so do the residuals of each (Bonferroni).
 
     Raises:
         OutOfDomain: a rate that is not between 0 and 1.
@@ -164,16 +160,18 @@ def judged(about: str, senses: Sequence[SenseResiduals], false_alarm: float = FA
     if not 0.0 < false_alarm < 1.0:
         raise OutOfDomain(f"a false alarm rate of {false_alarm:g} was given; it must be between 0 and 1")
     compared = max(1, sum(bool(one.residuals) for one in senses))
-    return Agreement(about, false_alarm, tuple(_judged(one, false_alarm / compared) for one in senses))
-
-
-def _judged(one: SenseResiduals, rate: float) -> JudgedSense:
-    if not one.residuals:
-        return JudgedSense(one, "not comparable" if one.refused_at is None else "does not fit", ())
-    each = rate / len(one.residuals)
-    limits = tuple(np.atleast_1d(chi2.isf(each, [residual.dof for residual in one.residuals])).tolist())
-    beyond = any(r.chi_square > limit for r, limit in zip(one.residuals, limits, strict=True))
-    return JudgedSense(one, "does not fit" if beyond else "fits", limits)
+    found = []
+    for one in senses:
+        verdict: Verdict = "not comparable" if one.refused_at is None else "does not fit"
+        limits: tuple[float, ...] = ()
+        if one.residuals:
+            each = false_alarm / compared / len(one.residuals)
+            dofs = [residual.dof for residual in one.residuals]
+            limits = tuple(np.atleast_1d(chi2.isf(each, dofs)).tolist())
+            beyond = any(r.chi_square > limit for r, limit in zip(one.residuals, limits, strict=True))
+            verdict = "does not fit" if beyond else "fits"
+        found.append(JudgedSense(one, verdict, limits))
+    return Agreement(about, false_alarm, tuple(found))
 
 
 def _sentence(one: JudgedSense) -> str:

@@ -48,12 +48,7 @@ class ContactDepth:
 def compare_with_twin(
     subject: Subject, contacts: Sequence[PressedContact], noise: PlaceNoise | None = None
 ) -> SenseResiduals:
-    """Joints and contacts of a run against the twin of its scene.
-
-    Args:
-        subject: the object, where the scene states it.
-        contacts: of the run.
-        noise: of places; None for the stated one.
+    """Compare joints and contacts of a run with the twin of its scene; ``noise`` is the station's if None.
 
     Raises:
         WrongUse: the object cannot stand in the scene.
@@ -90,10 +85,11 @@ def contact_depth(
     pose = contact.seen.base_from_gel
     changes = []
     for twist in np.diag(_STEPS):
-        ahead, behind = (_reached(bench, twisted(pose, sign * twist), _NOTHING) for sign in (1.0, -1.0))
+        depths = (bench.pad_depth(twisted(pose, sign * twist)) for sign in (1.0, -1.0))
+        ahead, behind = (max(_NOTHING, depth) for depth in depths)
         changes.append(ahead - behind)
     slope = np.asarray(np.array(changes) / (2.0 * _STEPS))
-    read, expected = max(0.0, float(contact.heights.max())), _reached(bench, pose)
+    read, expected = max(0.0, float(contact.heights.max())), max(0.0, bench.pad_depth(pose))
     shared = slope @ shared_twists(noise, pose, base_from_object[:3, 3])
     own = float(np.sqrt(slope @ noise.own @ slope + READ**2 + (GAIN * read) ** 2))
     return ContactDepth(contact.step, read, expected, shared, own)
@@ -118,10 +114,6 @@ def depth_residuals(depths: Sequence[ContactDepth]) -> tuple[Residual, ...]:
         )
         for depth, innovation, sigma in zip(depths, innovations, np.diag(root), strict=True)
     )
-
-
-def _reached(bench: TwinBench, base_from_gel: FloatArray, least: float = 0.0) -> float:
-    return max(least, bench.pad_depth(base_from_gel))
 
 
 def twisted(base_from_gel: FloatArray, twist: FloatArray) -> FloatArray:

@@ -43,13 +43,7 @@ class OutlineNoise:
 def compare_camera(
     subject: Subject, places: PlaceNoise | None = None, noise: OutlineNoise | None = None
 ) -> SenseResiduals:
-    """The outline in every picture of the scene camera against the model's.
-
-    Args:
-        subject: the object, where the scene states it.
-        places: of the object; None for the stated one.
-        noise: of the outline; None for the stated one.
-    """
+    """Compare the outline in every picture of the scene camera with the model's; noises may be given."""
     run, residuals, notes = subject.run, list[Residual](), list[str]()
     none = SenseResiduals("camera", "reference", (), "no picture by the scene camera was recorded")
     if run.station.camera is None:
@@ -89,14 +83,7 @@ def _residuals(
 def outline_residuals(
     step: int, view: "OutlineView", seen: SeenOutline, places: PlaceNoise, noise: OutlineNoise
 ) -> tuple[Residual, ...]:
-    """How far an outline lies from the model's, and how far its shape is off.
-
-    Args:
-        step: of the look.
-        view: the model before the camera.
-        seen: the outline; directions in which it is hidden do not count.
-        places: of the object.
-        noise: of the outline.
+    """Compare place and shape of an outline with the model's; hidden directions do not count.
 
     Raises:
         DataRefused: the outline is hidden in every direction, or the model stands behind the camera.
@@ -158,13 +145,6 @@ class OutlineView:
 
     def slopes(self, places: PlaceNoise, camera: CameraErrors) -> FloatArray:
         """``(72, 14)`` pixels for one sigma of everything that may be off."""
-        sigmas = np.concatenate(
-            [
-                3 * [places.position],
-                [places.tilt, places.tilt, places.yaw, places.scale],
-                3 * [camera.position],
-                3 * [camera.rotation],
-                [camera.focal_length],
-            ]
-        )
+        of_object = [*3 * [places.position], places.tilt, places.tilt, places.yaw, places.scale]
+        sigmas = [*of_object, *3 * [camera.position], *3 * [camera.rotation], camera.focal_length]
         return np.array([0.5 * (self.extents(one) - self.extents(-one)) for one in np.diag(sigmas)]).T

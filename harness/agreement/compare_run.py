@@ -12,7 +12,6 @@ from harness.agreement.sound import compare_sound
 from harness.agreement.subject import PressedContact, Subject, contacts_of, own_subject
 from harness.agreement.touch import compare_touch
 from harness.basics.errors import WrongUse
-from harness.objectfile.entries import Modality
 from harness.recording.run_folder import RunFiles
 
 HIDDEN = "the size of the object is what this run measures"
@@ -33,10 +32,10 @@ P = ParamSpec("P")
 def agreement_of(
     run: RunFiles, subject: Subject | None = None, reference: bool = False, measured: str = ""
 ) -> Agreement:
-    """Hold a recording against an object at the place that its scene states.
+    """Compare a recording with an object at the place that its scene states.
 
     Args:
-        run: of any experiment.
+        run: recording of any experiment.
         subject: the object; None for the run's own.
         reference: whether the reference simulation is compared too where a network stands for it.
         measured: what the run itself measures of its object, so that its scene does not state it, in a
@@ -57,31 +56,19 @@ def agreement_of(
 def _compared(
     subject: Subject, contacts: tuple[PressedContact, ...], reference: bool
 ) -> Iterator[SenseResiduals]:
-    sensors = subject.scene.sensors
-    yield _timed(_arm, subject, contacts)
-    for source in _sources(subject, "touch", reference):
-        yield _timed(compare_touch, subject, source, contacts) if sensors.touch else _unasked("touch", source)
-    for source in _sources(subject, "audio", reference):
-        yield _timed(compare_sound, subject, source, contacts) if sensors.sound else _unasked("sound", source)
-    if sensors.camera:
-        yield _timed(compare_camera, subject)
-    else:
-        yield _unasked("camera", "reference")
-
-
-def _arm(subject: Subject, contacts: tuple[PressedContact, ...]) -> SenseResiduals:
+    used, most = subject.scene.sensors, None if reference else 1
     try:
-        return compare_with_twin(subject, contacts)
+        yield _timed(compare_with_twin, subject, contacts)
     except WrongUse as refusal:  # another object may not fit where the scene's stands
-        return SenseResiduals("arm", "twin", (), str(refusal))
+        yield SenseResiduals("arm", "twin", (), str(refusal))
+    for source in subject.sources_of("touch")[:most]:
+        yield _timed(compare_touch, subject, source, contacts) if used.touch else _unused("touch", source)
+    for source in subject.sources_of("audio")[:most]:
+        yield _timed(compare_sound, subject, source, contacts) if used.sound else _unused("sound", source)
+    yield _timed(compare_camera, subject) if used.camera else _unused("camera", "reference")
 
 
-def _sources(subject: Subject, sense: Modality, reference: bool) -> tuple[Source, ...]:
-    sources = subject.sources_of(sense)
-    return sources if reference else sources[:1]
-
-
-def _unasked(sense: Sense, source: Source) -> SenseResiduals:
+def _unused(sense: Sense, source: Source) -> SenseResiduals:
     return SenseResiduals(sense, source, (), f"the scene uses no {sense}")
 
 

@@ -119,15 +119,15 @@ def compare_sound(
     shares: ShareNoise | None = None,
     phases: PhaseNoise | None = None,
 ) -> SenseResiduals:
-    """The resonances of a run against a model's modes, and how its strikes share them.
+    """Compare the resonances of a run with a model's modes, and how its strikes share them.
 
     Args:
         subject: the object.
         source: the ObjectFile's network, or finite elements.
-        contacts: of the run.
-        noise: of the resonances; None for the stated one.
-        shares: of the strikes' levels; None for the stated one.
-        phases: of the strikes; None for the stated one.
+        contacts: contacts of the run.
+        noise: noise of the resonances; None for the default, as of the next two.
+        shares: noise of the strikes' levels.
+        phases: noise of the strikes' phases.
     """
     noise, shares, phases = noise or ResonanceNoise(), shares or ShareNoise(), phases or PhaseNoise()
     struck = [contact for contact in contacts if contact.seen.strike is not None]
@@ -172,15 +172,7 @@ class StruckModes:
 def struck_modes(
     subject: Subject, struck: Sequence[PressedContact], modes: Modes, factor: float, error: float
 ) -> StruckModes:
-    """A model's modes where the strikes fell: at the places pressed, along the gel's axis.
-
-    Args:
-        subject: the object, where the scene states it.
-        struck: contacts that were.
-        modes: of the object.
-        factor: of the object's frequencies over the model's.
-        error: of a gain, that its source states.
-    """
+    """Evaluate a model's modes at the places that were struck, along the gel's axis; see ``StruckModes``."""
     poses = inverse(subject.base_from_object) @ np.array([one.seen.base_from_gel for one in struck])
     axes, depths = poses[:, :3, 2], np.array([max(0.0, float(one.heights.max())) for one in struck])
     # Unit to the last digit, whatever the controller's quaternions are.
@@ -192,14 +184,7 @@ def struck_modes(
 
 
 def resonance_residual(step: int, peaks: FloatArray, modes: FloatArray, noise: ResonanceNoise) -> Residual:
-    """How improbable it is that modes explain no more of the peaks, as ``-2 ln p``.
-
-    Args:
-        step: the last one that was struck.
-        peaks: ``(P,)`` Hz, at least one.
-        modes: ``(m,)`` Hz, ascending.
-        noise: of the resonances.
-    """
+    """Test how many of ``(P,)`` peaks, one or more, ``(m,)`` ascending modes explain, as ``-2 ln p``; Hz."""
     found = matched(peaks, modes, noise)
     unexplained = int(np.count_nonzero(~found.explained))
     probability = float(binom.sf(unexplained - 1, len(peaks), noise.clutter))
@@ -231,17 +216,10 @@ def matched(peaks: FloatArray, modes: FloatArray, noise: ResonanceNoise) -> Reso
 def microphone_residual(
     step: int, peaks: Sequence[Peak], modes: StruckModes, shares: ShareNoise, phases: PhaseNoise
 ) -> Residual | None:
-    """How improbable the strikes' shares are of a microphone at rest; None where no peak has any to compare.
+    """Test the strikes' shares for a microphone at rest; None where no peak has any to compare.
 
     Each peak has a score of its phases and one of its gains, normal where the model is right, and so is their
-    sum over its own sigma (Stouffer). Of that it is ``-2 ln p``, which is a chi-square of two degrees.
-
-    Args:
-        step: the last one that was struck.
-        peaks: resonances that the strikes have in common.
-        modes: of the model.
-        shares: noise of the gains.
-        phases: noise of the phases.
+    sum over its own sigma (Stouffer). The residual is its ``-2 ln p``, a chi-square of two degrees.
 
     Raises:
         WrongUse: gains of another number of strikes than the peaks have.
@@ -316,12 +294,9 @@ def _off(peak: Peak, modes: StruckModes, group: slice, noise: ShareNoise) -> flo
 
 
 def phase_score(peak: Peak, modes: FloatArray, noise: PhaseNoise) -> float | None:
-    """How far strikes are out of phase at a peak, in sigmas above the median; None where it has no phase.
+    """Return how far strikes are out of phase at a peak, in sigmas above the median.
 
-    Args:
-        peak: a resonance that the strikes have in common.
-        modes: ``(m,)`` Hz of the model, with the factor that the object's frequencies have over it.
-        noise: of the phases.
+    Modes are ``(m,)`` Hz of the model times the common factor; None where the peak has no single mode.
     """
     if np.count_nonzero(peak.heard) < _FEWEST or not is_single(peak, modes, noise):
         return None
@@ -336,12 +311,7 @@ def phase_score(peak: Peak, modes: FloatArray, noise: PhaseNoise) -> float | Non
 
 
 def skirts_at(peak: Peak, modes: FloatArray) -> FloatArray:
-    """``(m,)``: the energy of each mode's skirt at a peak over its own, were it as broad and as loud.
-
-    Args:
-        peak: a resonance.
-        modes: ``(m,)`` Hz.
-    """
+    """``(m,)``: the energy of each mode's skirt at a peak over its own, were it as broad and as loud."""
     apart = np.maximum(np.abs(np.log(modes / peak.frequency)), _NEXT)
     return np.asarray((half_width(peak) / apart) ** 2)
 

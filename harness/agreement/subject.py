@@ -108,22 +108,13 @@ def _of_object(chosen: Plan, given: Quantities) -> tuple[str, ...]:
 
 
 def own_subject(run: RunFiles, levels: Mapping[str, Level] | None = None) -> Subject:
-    """The object of a run's scene, with the ObjectFile that the run carries where it does.
-
-    Args:
-        run: whose readings are compared.
-        levels: of the simulation's dials; None for the default ones.
-    """
+    """Return the object of a run's scene, with the ObjectFile that the run may carry; see ``Subject``."""
     of = run.objectfile if run.carries_objectfile else None
     return Subject(run, run.scene, run.mesh, MATERIALS[run.scene.object.material], of, levels or {})
 
 
 def subject_of_file(run: RunFiles, folder: Path) -> Subject:
-    """An ObjectFile in the place of a run's object.
-
-    Args:
-        run: whose scene states the place.
-        folder: of the ObjectFile.
+    """Put an ObjectFile in the place of a run's object.
 
     Raises:
         WrongUse: there is none.

@@ -1,8 +1,7 @@
 """Touch: the gel's surface, as its picture shows it and as a model of the object gives it.
 
 The gel's pose is known to a few tenths of a millimetre and a degree, which moves most of a picture: it is
-found anew at each contact (``likeliest``), and what it is off by counts beside what the
-surface is off by.
+found anew at each contact, and what it is off by counts beside what the surface is off by.
 A network is wrong altogether at some places, so that no single contact speaks against an object; how many do
 not fit is binomial where the object is right.
 
@@ -89,14 +88,14 @@ def compare_touch(
     places: PlaceNoise | None = None,
     noise: SurfaceNoise | None = None,
 ) -> SenseResiduals:
-    """Every contact's surface of the gel against a model's.
+    """Compare every contact's surface of the gel with a model's.
 
     Args:
-        subject: the object, where the scene states it.
+        subject: the object.
         source: the ObjectFile's network, or the reference.
-        contacts: of the run.
-        places: of the gel's pose; None for the stated one.
-        noise: of the surface; None for the stated one.
+        contacts: contacts of the run.
+        places: noise of the gel's pose; None for the station's.
+        noise: noise of the surface; None for the default.
     """
     places, noise = places or PlaceNoise.at(subject.run.station.errors), noise or SurfaceNoise()
     residuals, notes = [], refusal_notes(contacts)
@@ -138,14 +137,7 @@ class Surfaces:
 
 
 def surface_residual(step: int, found: Surfaces, noise: SurfaceNoise, gross: float = 0.0) -> Residual:
-    """What a contact's surfaces are off by at the likeliest pose.
-
-    Args:
-        step: of the run.
-        found: of the contact.
-        noise: of the surface.
-        gross: probability that the model's surface is none of the object's.
-    """
+    """Compare a contact's surfaces; ``gross`` is the probability that the model's is none of the object's."""
     gaps = (found.read - found.modelled)[found.compared]
     area = len(gaps) * found.pitch**2
     # So many patches of the contact are off independently of each other.
@@ -167,12 +159,9 @@ def surface_residual(step: int, found: Surfaces, noise: SurfaceNoise, gross: flo
 
 
 def mixed(chi_squares: FloatArray, dof: float, gross: float = 0.0) -> float:
-    """The chi-square as improbable as ``(s,)`` ones are in the mean, of noises as probable as each other.
+    """Combine ``(s,)`` chi-squares of equally probable noises to the one that is as improbable as their mean.
 
-    Args:
-        chi_squares: one for each noise.
-        dof: of each.
-        gross: probability of anything, however large.
+    ``gross`` is the probability of any value, however large.
     """
     if len(chi_squares) == 1 and gross == 0.0:
         return float(chi_squares[0])
@@ -181,12 +170,7 @@ def mixed(chi_squares: FloatArray, dof: float, gross: float = 0.0) -> float:
 
 
 def counted_residual(residuals: Sequence[Residual], gross: float) -> Residual:
-    """How improbable it is that so many contacts do not fit, as ``-2 ln p``.
-
-    Args:
-        residuals: of the contacts, at least one.
-        gross: probability of each that the model's surface is none of the object's.
-    """
+    """Test how many contacts, of one or more, do not fit, as ``-2 ln p``; ``gross`` as above."""
     share = gross + (1.0 - gross) * _IMPROBABLE
     found = chi2.sf([one.chi_square for one in residuals], [one.dof for one in residuals])
     unlike = int(np.count_nonzero(found < share))
@@ -204,14 +188,7 @@ def counted_residual(residuals: Sequence[Residual], gross: float) -> Residual:
 def likeliest(
     subject: Subject, source: Source, contact: PressedContact, places: PlaceNoise, noise: SurfaceNoise
 ) -> Surfaces:
-    """The pose between reading and prior at which a contact fits best, and both surfaces there.
-
-    Args:
-        subject: the object, where the scene states it.
-        source: the ObjectFile's network, or the reference.
-        contact: of the run.
-        places: of the gel's pose.
-        noise: of the surface.
+    """Find the pose between reading and prior at which a contact fits best, and both surfaces there.
 
     Raises:
         OutOfDomain: no network was made for the stated pose, or for those at which it would fit.
@@ -246,14 +223,7 @@ class _Search:
         self._root = np.linalg.cholesky(twist_covariance(places, self._pose, anchor))
 
     def best(self) -> Surfaces:
-        at, modelled = self._best()
-        compared, twist = self._compared(modelled), self._root @ at[:6]
-        gain = 1.0 + self._noise.gain * float(at[6])
-        variances = np.array([self._variance(modelled, compared, error) for error in self._errors])
-        return Surfaces(self._read, modelled, variances, compared, self._pitch, twist, gain, float(at @ at))
-
-    def _best(self) -> tuple[FloatArray, FloatArray]:
-        """The unknowns and the surface of the best search; a second one only where the first fits badly."""
+        """Search once, and again from other starts where the first search fits badly."""
         found: list[tuple[float, FloatArray, FloatArray]] = []
         for places in (_ASIDE[:1], _ASIDE[1:]):
             at, free = self._settled(self._start(places))
@@ -263,7 +233,8 @@ class _Search:
             modelled = self._shown(modelled, at)
             cost = self._whole_cost(modelled, at)
             if cost < _POORLY * self._dof(self._compared(modelled)):
-                return at, modelled
+                found = [(cost, at, modelled)]
+                break
             if free:
                 found.append((cost, at, modelled))
         if not found:
@@ -271,7 +242,11 @@ class _Search:
                 f"the touch's {self._source} was made neither for the stated pose of the gel nor for those "
                 "about it at which it would fit; compare with --reference"
             )
-        return min(found, key=lambda one: one[0])[1:]
+        _, at, modelled = min(found, key=lambda one: one[0])
+        compared, twist = self._compared(modelled), self._root @ at[:6]
+        gain = 1.0 + self._noise.gain * float(at[6])
+        variances = np.array([self._variance(modelled, compared, error) for error in self._errors])
+        return Surfaces(self._read, modelled, variances, compared, self._pitch, twist, gain, float(at @ at))
 
     def _start(self, places: Sequence[tuple[float, float]]) -> FloatArray:
         """The likeliest of poses about the stated one; the stated one where the source knows none of them."""
@@ -356,19 +331,16 @@ class _Search:
 
     def _simulated(self, tried: Sequence[FloatArray] | FloatArray) -> list[FloatArray | None]:
         """The gel's surfaces in blocks, by pose alone; None of a pose that the source was not made for."""
+        poses = np.array([twisted(self._pose, self._root @ at[:6]) for at in tried])
+        given: Quantities = {"contact_gel_from_object": inverse(poses) @ self._subject.base_from_object}
         try:
-            return [self._coarse(surface) for surface in self._surfaces(tried)]
+            found = self._subject.simulated("touch", self._source, ("touch.gel",), given)
         except OutOfDomain:
             if len(tried) == 1:
                 return [None]
-        half = len(tried) // 2
-        return [*self._simulated(tried[:half]), *self._simulated(tried[half:])]
-
-    def _surfaces(self, tried: Sequence[FloatArray] | FloatArray) -> FloatArray:
-        """``(n, rows, columns)`` m of the gel's surface."""
-        poses = np.array([twisted(self._pose, self._root @ at[:6]) for at in tried])
-        given: Quantities = {"contact_gel_from_object": inverse(poses) @ self._subject.base_from_object}
-        return self._subject.simulated("touch", self._source, ("touch.gel",), given).values["touch_gel"]
+            half = len(tried) // 2
+            return [*self._simulated(tried[:half]), *self._simulated(tried[half:])]
+        return [self._coarse(surface) for surface in found.values["touch_gel"]]
 
     def _shown(self, surface: FloatArray, at: FloatArray) -> FloatArray:
         """A surface as its picture would show it, with its gain and its skirt."""

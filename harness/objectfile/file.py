@@ -57,10 +57,7 @@ class ObjectFile:
 
     @cached_property
     def content_key(self) -> str:
-        """A hash of all that the folder holds.
-
-        ``object.json`` names the hash of every file, and ``read`` refuses a file of another.
-        """
+        """A hash of all that the folder holds: ``object.json`` names the hash of every file."""
         return hashlib.sha256(description_text(self.description).encode()).hexdigest()
 
     @cached_property
@@ -118,14 +115,7 @@ def file_entry(name: str, data: bytes) -> FileEntry:
 def create_object(
     folder: Path, name: str, mesh: Mesh, material: Material, provenance: Provenance
 ) -> ObjectFile:
-    """A new ObjectFile without any modality yet.
-
-    Args:
-        folder: made where it is not there.
-        name: of the object.
-        mesh: its surface in metres.
-        material: it is made of.
-        provenance: of the mesh.
+    """Create an ObjectFile without any modality; the mesh is in metres, and the provenance is its.
 
     Raises:
         WrongUse: the folder holds an ObjectFile already.
@@ -161,16 +151,9 @@ def with_part(
     entry: AudioEntry | TouchEntry | VisionEntry,
     contents: Mapping[str, bytes],
 ) -> ObjectFile:
-    """The ObjectFile with a modality written, in place of what there was of it.
+    """Write a modality into an ObjectFile, in place of what there was of it; see ``write_described``.
 
-    Files are written before ``object.json``: whoever reads meanwhile gets the old part, the new
-    one, or a refusal by hash.
-
-    Args:
-        of: written to.
-        modality: the key in ``object.json``.
-        entry: what is said of it.
-        contents: bytes of every file that the entry names, by name.
+    ``contents`` holds the bytes of every file that the entry names, by name.
 
     Raises:
         DataRefused: entry and contents do not belong together.

@@ -5,12 +5,12 @@ weights that are not finite, and values whose size is unknown. ``graph_cost`` bo
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import onnx
 from google.protobuf.message import DecodeError
-from onnx import GraphProto, ModelProto, TensorProto, helper, numpy_helper
+from onnx import ModelProto, TensorProto, helper, numpy_helper
 
 from harness.basics.errors import DataRefused
 from harness.objectfile.entries import Tensor
@@ -35,11 +35,7 @@ _AGAIN = "build the object again, or get it from where it was built"
 
 
 def checked_graph(data: bytes, name: str) -> ModelProto:
-    """The graph in a file's bytes.
-
-    Args:
-        data: of the file.
-        name: of the file, for messages.
+    """Read and check the graph in the bytes of the file ``name``.
 
     Raises:
         DataRefused: it is no graph, or one that must not be run, with the reason.
@@ -49,8 +45,11 @@ def checked_graph(data: bytes, name: str) -> ModelProto:
     except DecodeError as error:
         raise DataRefused(f"{name} is not ONNX; copy it again") from error
     _check_nodes(model, name)
-    for tensor in _tensors(model.graph):
+    for tensor in model.graph.initializer:
         _check_tensor(tensor, name)
+    for item in (item for node in model.graph.node for item in node.attribute):
+        for tensor in (item.t, *item.tensors) if item.HasField("t") else item.tensors:
+            _check_tensor(tensor, name)
     try:
         onnx.checker.check_model(model, full_check=True)
     except (onnx.checker.ValidationError, onnx.shape_inference.InferenceError, ValueError) as error:
@@ -73,13 +72,6 @@ def _check_nodes(model: ModelProto, name: str) -> None:
             )
         if any(item.HasField("g") or item.graphs for item in node.attribute):
             raise DataRefused(f"{name} has a graph within its operation {node.op_type!r}; {_AGAIN}")
-
-
-def _tensors(graph: GraphProto) -> Iterator[TensorProto]:
-    yield from graph.initializer
-    for node in graph.node:
-        for item in node.attribute:
-            yield from (item.t, *item.tensors) if item.HasField("t") else item.tensors
 
 
 def _check_tensor(tensor: TensorProto, name: str) -> None:

@@ -23,15 +23,15 @@ _FATAL = 4
 
 
 class Network:
-    """A graph that was looked through, ready to run.
+    """A checked graph, ready to run.
 
     Args:
-        data: of the file.
-        name: of the file, for messages.
-        inputs: it must take.
-        outputs: it must give.
-        threads: that one run may use.
-        only: the outputs that are computed; all where none is named.
+        data: bytes of the file.
+        name: name of the file, for messages.
+        inputs: inputs that it must have.
+        outputs: outputs that it must have.
+        threads: threads of one run.
+        only: names of the outputs that are computed; empty for all.
 
     Raises:
         DataRefused: the graph must not be run, or is not the one described.
@@ -74,23 +74,17 @@ class Network:
             DataRefused: onnxruntime cannot compute them, or so many at once take too much memory or work.
         """
         names = [tensor.name for tensor in self.outputs]
-        if self._asks_nothing(inputs):
+        nothing = {tensor.name: _of_none(tensor) for tensor in self.inputs}
+        if {name: array.shape for name, array in inputs.items()} == nothing:
             # onnxruntime's products cannot broadcast over none.
             return {tensor.name: np.empty(_of_none(tensor), tensor.dtype) for tensor in self.outputs}
-        self._cost.require_call(self._rows(inputs), self.name)
+        # Inputs of other shapes are refused by onnxruntime.
+        rows = max((len(array) for array in inputs.values() if np.ndim(array)), default=0)
+        self._cost.require_call(rows, self.name)
         try:
             return dict(zip(names, self._session.run(names, dict(inputs)), strict=True))
         except Exception as error:
             raise _failed(self.name, error) from error
-
-    def _rows(self, inputs: Mapping[str, AnyArray]) -> int:
-        """The number of queries; inputs of other shapes are refused by onnxruntime."""
-        return max((len(array) for array in inputs.values() if np.ndim(array)), default=0)
-
-    def _asks_nothing(self, inputs: Mapping[str, AnyArray]) -> bool:
-        """Whether every input is there, in its shape, for no queries."""
-        wanted = {tensor.name: _of_none(tensor) for tensor in self.inputs}
-        return {name: array.shape for name, array in inputs.items()} == wanted
 
 
 def _of_none(tensor: Tensor) -> tuple[int, ...]:

@@ -1,7 +1,5 @@
 """Whether a network answers as it did when it was made: another's does not, whatever its hash."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from harness.basics.arrays import AnyArray
@@ -11,13 +9,7 @@ from harness.objectfile.runtime import Network
 
 
 def open_network(data: bytes, entry: NetworkEntry, threads: int = 1, only: tuple[str, ...] = ()) -> Network:
-    """The network of an entry, from its file's bytes, once it has answered its self-test.
-
-    Args:
-        data: of the file.
-        entry: what ``object.json`` says of it.
-        threads: that one run may use.
-        only: the outputs that are computed; all where none is named.
+    """Open the network of an entry from its file's bytes and run its self-test; see ``Network``.
 
     Raises:
         DataRefused: as ``Network``; or it answers otherwise than when it was made.
@@ -28,31 +20,18 @@ def open_network(data: bytes, entry: NetworkEntry, threads: int = 1, only: tuple
 
 
 def require_self_test(network: Network, test: SelfTest) -> float:
-    """The greatest difference from what was answered when it was made, relative to the greatest number.
+    """Return the greatest difference from the outputs when it was made, relative to the greatest number.
 
     Raises:
         DataRefused: it is more than the tolerance, or the test is none.
     """
     named = zip(network.inputs, test.inputs, strict=True)
     queries = {item.name: queries_of(item, values, test.rows) for item, values in named}
-    return require_answers(network.name, network(queries), test)
-
-
-def require_answers(name: str, outputs: Mapping[str, AnyArray], test: SelfTest) -> float:
-    """The greatest difference of a network's outputs from those of its self-test, as ``require_self_test``.
-
-    Args:
-        name: of the network's file, for messages.
-        outputs: of its queries, all of them or some.
-        test: with what they were when the network was made.
-
-    Raises:
-        DataRefused: it is more than the tolerance, or the test is none.
-    """
+    outputs = network(queries)
     worst = max(_gap(outputs[kept.name].ravel(), kept) for kept in test.outputs if kept.name in outputs)
     if not worst <= test.tolerance:
         raise DataRefused(
-            f"{name} differs from what it gave when it was made by {worst:.2g} of the greatest "
+            f"{network.name} differs from what it gave when it was made by {worst:.2g} of the greatest "
             f"number, where {test.tolerance:g} is allowed: another onnxruntime that computes otherwise, or "
             "another object's network; build the object again"
         )

@@ -8,7 +8,6 @@ import re
 
 import numpy as np
 
-from harness.basics.arrays import AnyArray
 from harness.basics.errors import MeshRefused
 from harness.basics.mesh import Mesh
 
@@ -61,14 +60,6 @@ def mesh_from_ply(data: bytes, name: str, metres_per_unit: float = 1.0) -> Mesh:
         )
     points = np.frombuffer(data, "<f8", 3 * vertices, head.end()).reshape(-1, 3) * metres_per_unit
     triangles = np.frombuffer(data, _FACE, faces, middle)
-    _check(points, triangles, name)
-    mesh = Mesh(points, triangles["corners"])
-    if not mesh.face_areas.sum() > 0.0:
-        raise MeshRefused(f"{name} has no surface: every face has zero area; build the object again")
-    return mesh
-
-
-def _check(points: AnyArray, triangles: AnyArray, name: str) -> None:
     corners = triangles["corners"]
     if len(corners) == 0 or len(points) == 0:
         raise MeshRefused(f"{name} holds no triangle; build the object again")
@@ -78,3 +69,7 @@ def _check(points: AnyArray, triangles: AnyArray, name: str) -> None:
         )
     if not (np.abs(points) <= _FARTHEST).all():
         raise MeshRefused(f"{name} has a vertex that is not within {_FARTHEST:g} m; build the object again")
+    mesh = Mesh(points, corners)
+    if not mesh.face_areas.sum() > 0.0:
+        raise MeshRefused(f"{name} has no surface: every face has zero area; build the object again")
+    return mesh

@@ -22,7 +22,7 @@ from harness.bench.scene_objectfile import find_objectfile
 from harness.bench.sensor import DEFAULT_MAKE, described_sensor
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.published.entries import PublishedObject, open_either
-from harness.objectfile.verify.verify import verify
+from harness.objectfile.verify import verify
 from harness.sim.modal.modal import HEARING
 from harness.sim.modal.solve import cpu, wall
 

@@ -16,7 +16,7 @@ from harness.api import answer
 from harness.bench.scene import load_scene
 from harness.bench.station_file import load_station
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.verify.verify import verify
+from harness.objectfile.verify import verify
 from harness.sim.gel.markers import read_markers
 
 SAMPLES = Path(__file__).parents[1] / "samples" / "written_at_bc239515"

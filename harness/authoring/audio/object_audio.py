@@ -17,7 +17,7 @@ from harness.basics.store import Store
 from harness.objectfile.audio.part import AudioPart, with_audio
 from harness.objectfile.entries import Source
 from harness.objectfile.file import ObjectFile, with_part
-from harness.objectfile.verify.verify import verify
+from harness.objectfile.verify import verify
 from harness.sim.modal.file import modes_of_file
 from harness.sim.modal.modal import HEARING, default_edge, solved_once
 from harness.sim.modal.modes import Modes, dampings

@@ -34,8 +34,7 @@ from harness.objectfile.published.sound import (
     spectrum_sounds,
     sum_modes,
 )
-from harness.objectfile.published.taxim_picture import TaximPicture
-from harness.objectfile.published.touch import touch_images, touch_maps
+from harness.objectfile.published.touch import TaximPicture, touch_images, touch_maps
 from harness.objectfile.touch.level import require_gel
 from harness.objectfile.touch.touch import open_touch
 from harness.objectfile.vision.render import open_vision
@@ -184,14 +183,7 @@ def read_rows(path: Path, columns: int, meaning: str) -> FloatArray:
 def answer_queries(
     of: Object, queries: Mapping[str, Rows], settings: QuerySettings, out: Path
 ) -> AnsweredQueries:
-    """Answer query files; errors as of the senses of the object, and ``OutOfDomain`` for untrained queries.
-
-    Args:
-        of: imported or built object.
-        queries: rows by sense, of ``read_queries``.
-        settings: settings of the answers.
-        out: folder in which a folder for each sense is made.
-    """
+    """Answer query files in a folder for each sense in ``out``; ``OutOfDomain`` if they are untrained."""
     answered = AnsweredQueries()
     writers = {"audio": _write_sounds, "touch": _write_touches, "vision": _write_views}
     for sense, rows in queries.items():

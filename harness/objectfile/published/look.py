@@ -139,16 +139,14 @@ RawField = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 the ``(3,)`` unit light direction to ``(n, 4)`` raw red, green, blue and density; zeros in empty space."""
 
 
-@dataclass(frozen=True, eq=False)
-class OsfNetwork:
-    """One network for all points."""
+def osf_field(network: Network) -> RawField:
+    """Return the field of one network for all points."""
 
-    network: Network
-
-    def raw(self, points: FloatArray, views: FloatArray, light: FloatArray) -> FloatArray:
-        """Compute raw colour and density; see ``RawField``."""
+    def raw(points: FloatArray, views: FloatArray, light: FloatArray) -> FloatArray:
         lights = np.broadcast_to(light, points.shape)
-        return _joined(query(self.network, {"points": points, "views": views, "light": lights}))
+        return _joined(query(network, {"points": points, "views": views, "light": lights}))
+
+    return raw
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,8 +230,8 @@ class PublishedLook:
         network = of.network(entry.network)
         if entry.cells is not None:
             return cls(entry, CellNetworks.open(of, entry.cells, network).raw)
-        fine = None if entry.fine is None else OsfNetwork(of.network(entry.fine)).raw
-        return cls(entry, OsfNetwork(network).raw, fine)
+        fine = None if entry.fine is None else osf_field(of.network(entry.fine))
+        return cls(entry, osf_field(network), fine)
 
     def picture(self, view: PublishedView, size: int, offset: float) -> FloatArray:
         """Render ``(size, size, 3)`` colours, of which 0 is black and 1 white; some may be outside of that.

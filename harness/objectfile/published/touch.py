@@ -1,11 +1,19 @@
-"""Touch of imported objects: maps of distance (version 2.0) or colours (1.0)."""
+"""Touch of imported objects: maps of distance (version 2.0) and their pictures, or colours (1.0).
+
+``TaximPicture`` is ObjectFolder 2.0's own use of Taxim, with its calibration. The published program takes
+millimetres a pixel from the real sensor and distances from a virtual camera with others; slopes are a quarter
+too steep near the axis because of it, and the colours were fitted to them so.
+"""
 
 import math
+from dataclasses import dataclass
+from pathlib import Path
 
+import cv2
 import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray, read_only
-from harness.basics.errors import OutOfDomain
+from harness.basics.errors import CalibrationRefused, OutOfDomain
 from harness.objectfile.published.entries import (
     Bounds,
     PublishedColoursEntry,
@@ -13,6 +21,8 @@ from harness.objectfile.published.entries import (
     PublishedObject,
 )
 from harness.objectfile.published.query import coordinate_bounds, query, require_trained
+from harness.sim.optics.kernels import change_exactly
+from harness.sim.optics.published_pack import PRESSES, TABLE, read_published, read_table
 
 TILT = math.radians(15.0)
 """rad: the greatest tilt of a press; with the depths and distances below it is in the published program
@@ -98,3 +108,78 @@ def normalised_coordinates(coordinates: FloatArray, bounds: Bounds) -> FloatArra
     low, high = bounds
     normalised: FloatArray = 2.0 * ((coordinates - low) / high) - 1.0
     return normalised
+
+
+PITCH = 0.1245e-3
+"""Size of a pixel in the published program, m."""
+
+_CORE = 0.2
+"""Fraction of the press's depth; the gel touches where it is pushed in more than that."""
+
+_KERNELS = (11, 5)
+"""Widths in pixels of the blurs outside of the contact."""
+
+
+@dataclass(frozen=True, eq=False)
+class TaximPicture:
+    """A published calibration, ready for pictures."""
+
+    table: FloatArray  #: ``(bins, bins, 6, 3)`` RGB.
+    rest: FloatArray  #: ``(rows, columns)`` pixels, the untouched gel towards the camera.
+    base: FloatArray
+    """``(rows, columns, 3)`` RGB: the untouched gel's picture less the table's colours of its dome."""
+
+    @classmethod
+    def open(cls, folder: Path, shape: tuple[int, int]) -> "TaximPicture":
+        """Open the calibration of a folder, for maps of a shape.
+
+        Raises:
+            CalibrationRefused: no published calibration, without the untouched gel's shape, or of another
+            camera.
+        """
+        pack = read_published(folder, PITCH)
+        if pack.rest is None or pack.rest.shape != shape:
+            raise CalibrationRefused(
+                f"{folder} has no untouched gel of {shape[0]} x {shape[1]} pixels (depth_bg.npy); give the "
+                f"folder that ObjectFolder 2.0 publishes, with {TABLE} and {PRESSES}"
+            )
+        table, rest = read_table(folder / TABLE), pack.rest / PITCH
+        return cls(table, rest, pack.calibration.background.astype(np.float64) - table_colours(rest, table))
+
+    def colours(self, depth: FloatArray, pressed: float) -> FloatArray:
+        """Compute ``(rows, columns, 3)`` RGB of 0 to 255, not rounded.
+
+        Args:
+            depth: ``(rows, columns)`` distance from the camera, m.
+            pressed: depth of the press, m.
+        """
+        height = (SEEN_DEPTH[1] - depth) / PITCH
+        contact = height - self.rest > _CORE * pressed / PITCH
+        # Blurred where nothing touches, in single precision as published.
+        soft = height.astype(np.float32)
+        for width in _KERNELS:
+            soft = np.asarray(cv2.GaussianBlur(soft, (width, width), 0), np.float32)
+            soft[contact] = height[contact]
+        coloured = table_colours(soft.astype(np.float64), self.table) + self.base
+        found: FloatArray = np.clip(coloured, 0.0, 255.0)
+        return found
+
+    def image(self, depth: FloatArray, pressed: float) -> ByteArray:
+        """Compute the picture, rounded; arguments as ``colours``."""
+        return np.rint(self.colours(depth, pressed)).astype(np.uint8)
+
+    def compat_image(self, depth: FloatArray, pressed: float) -> ByteArray:
+        """Compute the picture as the published program does: cut off below, blue where red belongs."""
+        return np.ascontiguousarray(self.colours(depth, pressed)[..., ::-1]).astype(np.uint8)
+
+
+def table_colours(height: FloatArray, table: FloatArray) -> FloatArray:
+    """Look up ``(rows, columns, 3)`` colours of a surface's slopes.
+
+    Args:
+        height: ``(rows, columns)`` pixels.
+        table: ``(bins, bins, 6, 3)``: by steepness and direction, a polynomial of the place.
+    """
+    colours = np.empty((*height.shape, 3))
+    change_exactly(height, table, colours)
+    return colours

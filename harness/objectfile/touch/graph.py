@@ -20,14 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 from onnx import ModelProto, TensorProto, helper
 
-from harness.basics.arrays import BoolArray, ByteArray, FloatArray
+from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray
 from harness.basics.errors import WrongUse
 from harness.bench.sensor import TactileSensor
 from harness.objectfile.graph import Nodes, Storage
 from harness.objectfile.touch.patch_rays import PatchRays, shape_of
-from harness.objectfile.touch.skirt import hung
 from harness.objectfile.touch_entries import ray_pixels
-from harness.sim.gel.gel import GelSkirt
+from harness.sim.gel.gel import GelSkirt, half_kernel
 from harness.sim.gel.height_map import SEARCH_DEPTH
 
 _LOOKUPS = 3
@@ -178,3 +177,38 @@ def _check(patches: PatchCodes, sensor: TactileSensor, lookups: int) -> None:
         )
     if not (np.isfinite(patches.mean).all() and patches.pitch > 0.0):
         raise WrongUse("a mean of heights that is not finite, or a pitch that is not positive")
+
+
+def hung(nodes: Nodes, deep: str, sensor: TactileSensor, skirt: GelSkirt) -> str:
+    """Add the gel's skirt, as ``harness.sim.gel.gel.deform``, to ``(n, rows, columns)`` m of penetration.
+
+    Blurs are products with banded matrices.
+    """
+    deepest = nodes.add("ReduceMax", deep, axes=[1, 2], keepdims=1)
+    core = nodes.add("Mul", deepest, nodes.constant(np.array(skirt.core, np.float32)))
+    kept = nodes.add("Greater", deep, core)
+    widths = sorted({*skirt.kernels, skirt.final} - {1})
+    blurs = {}
+    for width in widths:
+        down, along = blur_matrix(sensor.rows, width), blur_matrix(sensor.columns, width)
+        blurs[width] = nodes.constant(down), nodes.constant(along.T)
+
+    def blurred(image: str, width: int) -> str:
+        down, along = blurs[width]
+        return nodes.add("MatMul", nodes.add("MatMul", down, image), along)
+
+    surface = deep
+    for width in skirt.kernels:
+        surface = nodes.add("Where", kept, deep, blurred(surface, width) if width > 1 else surface)
+    return blurred(surface, skirt.final) if skirt.final > 1 else surface
+
+
+def blur_matrix(size: int, width: int) -> AnyArray:
+    """``(size, size)`` float32: one direction of ``gel_kernels.blur``, which mirrors at the border."""
+    half = half_kernel(width)
+    matrix = np.zeros((size, size))
+    for k in range(1 - len(half), len(half)):
+        at = np.abs(np.arange(size) + k) % max(2 * (size - 1), 1)
+        mirrored = np.where(at < size, at, 2 * (size - 1) - at)
+        np.add.at(matrix, (np.arange(size), mirrored), half[abs(k)])
+    return matrix.astype(np.float32)

@@ -88,12 +88,12 @@ class NodeSearch:
 
 
 def nodes_bytes(nodes: SurfaceNodes) -> bytes:
-    """``.npy``: float64 ``(n, 6)``, points in metres and normals."""
+    """Write ``.npy``: float64 ``(n, 6)``, points in metres and normals."""
     return npy_bytes(np.hstack([nodes.points, nodes.normals]), "<f8")
 
 
 def nodes_from(data: bytes, name: str) -> SurfaceNodes:
-    """The nodes of a file.
+    """Read nodes from a ``.npy`` file of float64 ``(n, 6)``, points in metres and normals.
 
     Raises:
         DataRefused: it holds something else.

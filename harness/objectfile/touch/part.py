@@ -123,9 +123,7 @@ def codes_tensors(
 
 
 def _codes(part: TouchPart, contents: dict[str, bytes]) -> CodesEntry:
-    codes = part.codes
-    count = len(codes.nodes)
-    deepest = part.sensor.gel_thickness
+    codes, count, deepest = part.codes, len(part.codes.nodes), part.sensor.gel_thickness
     inputs, outputs = codes_tensors(count, codes.most_off + deepest, part.sensor)
     chosen = np.linspace(0, count - 1, _SELF_TEST_ROWS).astype(np.int64)[:, None]
     poses = np.tile(np.eye(4)[:3], (_SELF_TEST_ROWS, 1, 1))
@@ -133,11 +131,9 @@ def _codes(part: TouchPart, contents: dict[str, bytes]) -> CodesEntry:
     asked = {"node": chosen, "node_from_gel": poses}
     contents[NODES] = nodes_bytes(codes.nodes)
     written = NetworkPart(CODES, codes.graph, inputs, outputs, asked, _TOLERANCE, codes.measured, _seen)
-    network = network_entry(written, contents)
-    nodes = file_entry(NODES, contents[NODES])
     return CodesEntry(
-        network=network,
-        nodes=nodes,
+        network=network_entry(written, contents),
+        nodes=file_entry(NODES, contents[NODES]),
         most_off_m=codes.most_off,
         deepest_m=deepest,
         most_tilt_rad=MOST_TILT,

@@ -127,11 +127,7 @@ class CodedDepth:
 
 
 def open_tool_depth(of: ObjectFile, threads: int = 1) -> CodedDepth:
-    """First surfaces along a tool, by the codes of an object's touch.
-
-    Args:
-        of: an object that has a touch.
-        threads: that the network may use.
+    """Open the codes of an object's touch for first surfaces along a tool.
 
     Raises:
         DataRefused: it has no codes, or a file of it is damaged.

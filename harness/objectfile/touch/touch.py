@@ -95,30 +95,11 @@ class ObjectTouch:
             OutOfDomain: a depth, tilt or place that the level was not made for; the worst is named.
             DataRefused: a map that is not finite.
         """
-        self._require(presses)
-        gel = self.entry.gel
-        found = np.empty((len(presses), gel.rows, gel.columns))
-        for first in range(0, len(presses), CHUNK):
-            found[first : first + CHUNK] = self.maps(presses[first : first + CHUNK])
-        if not np.isfinite(found).all():
-            bad = int(np.count_nonzero(~np.isfinite(found).all(axis=(1, 2))))
-            raise DataRefused(
-                f"the touch's {self.level} gives numbers that are not finite for {bad} of "
-                f"{len(presses)} presses; build it again, or take its other level"
-            )
-        return found
-
-    @property
-    def _limits(self) -> tuple[float, float, float]:
-        """m, least and greatest depth, and rad, the greatest tilt."""
-        codes = self.entry.codes
+        low, high = self.entry.depth_m
+        most, codes = self.entry.most_tilt_rad, self.entry.codes
         # The mesh answers any press, and is asked beside the others.
         if codes is not None:
-            return 0.0, codes.deepest_m, codes.most_tilt_rad
-        return *self.entry.depth_m, self.entry.most_tilt_rad
-
-    def _require(self, presses: Presses) -> None:
-        low, high, most = self._limits
+            low, high, most = 0.0, codes.deepest_m, codes.most_tilt_rad
         depths, tilts = presses.depths, presses.tilts
         if ((depths < low - _EDGE * high) | (depths > high * (1.0 + _EDGE))).any():
             raise OutOfDomain(
@@ -133,6 +114,17 @@ class ObjectTouch:
                 "simulate it with `touchstone sim touch`"
             )
         self.surface.require_within(presses.points, self.entry.near_surface_m, f"the touch's {self.level}")
+        gel = self.entry.gel
+        found = np.empty((len(presses), gel.rows, gel.columns))
+        for first in range(0, len(presses), CHUNK):
+            found[first : first + CHUNK] = self.maps(presses[first : first + CHUNK])
+        if not np.isfinite(found).all():
+            bad = int(np.count_nonzero(~np.isfinite(found).all(axis=(1, 2))))
+            raise DataRefused(
+                f"the touch's {self.level} gives numbers that are not finite for {bad} of "
+                f"{len(presses)} presses; build it again, or take its other level"
+            )
+        return found
 
 
 def _span(values: FloatArray) -> str:
@@ -141,12 +133,7 @@ def _span(values: FloatArray) -> str:
 
 
 def open_touch(of: ObjectFile, level: TouchLevel = "codes", threads: int = 1) -> ObjectTouch:
-    """The touch of an object at a level.
-
-    Args:
-        of: an object that has a touch.
-        level: ``"codes"`` or ``"reference"``.
-        threads: that the network may use.
+    """Open the touch of an object at a level.
 
     Raises:
         DataRefused: the object has no touch or no codes, or a file of it is damaged.

@@ -167,13 +167,7 @@ def sort_into_blocks(networks: IntArray, every: int, size: int) -> tuple[IntArra
 def vision_tensors(
     grid: VisionGrid, size: NetworkSize, block: int = BLOCK
 ) -> tuple[tuple[Input, ...], tuple[Tensor, ...]]:
-    """What ``vision_graph`` takes and gives.
-
-    Args:
-        grid: of the networks.
-        size: of each.
-        block: samples of one network that are asked together.
-    """
+    """Describe the inputs and outputs of ``vision_graph``; ``block`` samples are of one network."""
     (a, b, c), (d, e, f) = grid.low.tolist(), grid.high.tolist()
     return box_tensors(len(grid), ((a, b, c), (d, e, f)), size.extras, block)
 
@@ -232,11 +226,7 @@ class _Blocks:
 
 
 def vision_graph(model: VisionModel, block: int = BLOCK) -> ModelProto:
-    """The graph of an object's look.
-
-    Args:
-        model: its weights are kept as float16.
-        block: samples of one network that are asked together.
+    """Write the graph of an object's look, weights as float16, for blocks of samples of one network.
 
     Raises:
         WrongUse: weights that float16 cannot hold, or an empty block.

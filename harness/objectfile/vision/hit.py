@@ -44,11 +44,7 @@ class SurfacePoints:
 
 
 class HitSurface:
-    """A mesh whose points are looked up for one picture after another.
-
-    Args:
-        contours: of the mesh.
-    """
+    """A mesh whose points are looked up for one picture after another."""
 
     def __init__(self, contours: Contours) -> None:
         mesh = contours.mesh

@@ -172,9 +172,6 @@ class VisionGrid:
     def require_surface(self, mesh: Mesh) -> None:
         """Refuse a surface of another object than the networks'.
 
-        Args:
-            mesh: in metres.
-
         Raises:
             DataRefused: it goes where no network answers.
         """

@@ -77,14 +77,7 @@ def with_vision(of: ObjectFile, part: VisionPart) -> ObjectFile:
 def blocks_inside(
     model: VisionModel, count: int, block: int, random: np.random.Generator
 ) -> dict[str, AnyArray]:
-    """Blocks of queries, each within the cell of its network, networks from the first to the last.
-
-    Args:
-        model: that is asked.
-        count: of blocks.
-        block: samples of each.
-        random: draws places, views, lights, visibilities and normals.
-    """
+    """Sample ``count`` blocks of queries, each within the cell of its network, from the first to the last."""
     grid, extras = model.grid, model.weights.size.extras
     networks = np.linspace(0, len(grid) - 1, count).astype(np.int64)
     shares = random.random((count, block, 3))

@@ -147,12 +147,7 @@ class ObjectVision:
     def picture(
         self, camera: Pinhole, light: DirectionalLight, settings: RenderSettings | None = None
     ) -> Rendered:
-        """Render the object under one light.
-
-        Args:
-            camera: outside of the object.
-            light: from far away.
-            settings: None for the default.
+        """Render the object under one light from far away; settings are the default if None.
 
         Raises:
             OutOfDomain: a camera within the object, or a picture larger than is drawn, all its rays counted.

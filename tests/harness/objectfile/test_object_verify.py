@@ -18,8 +18,7 @@ from harness.objectfile.file import ObjectFile, file_entry
 from harness.objectfile.npy_file import npy_bytes
 from harness.objectfile.self_test import open_network
 from harness.objectfile.surface_file import ply_bytes
-from harness.objectfile.verify.network import look_at_domain, look_at_self_test
-from harness.objectfile.verify.verify import verify
+from harness.objectfile.verify import look_at_domain, look_at_self_test, verify
 from tests.samples.object_bench import MODES, egg, egg_waves, exchange, rewrite
 
 SAMPLES = Path(__file__).parent / "samples"

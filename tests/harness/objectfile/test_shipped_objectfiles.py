@@ -7,7 +7,7 @@ from harness.bench.scene import scene_from_options
 from harness.bench.scene_objectfile import shipped_objectfiles
 from harness.effects.scene_object import known_file, known_object
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.verify.verify import verify
+from harness.objectfile.verify import verify
 from harness.objects import household
 
 MOST_BYTES = 40_000_000

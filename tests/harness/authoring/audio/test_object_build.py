@@ -11,7 +11,7 @@ from harness.authoring.audio.object_audio import STAGES
 from harness.cli import invoke
 from harness.objectfile.audio.audio import open_audio
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.verify.verify import verify
+from harness.objectfile.verify import verify
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from harness.authoring.catalogue.worker import Job
 from harness.basics.errors import WrongUse
 from harness.basics.materials import MATERIALS
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.verify.verify import verify
+from harness.objectfile.verify import verify
 from tests.samples.tiny_catalogue import BOTH, TOUCH, all_bytes, block, block_row, tiny_job
 
 

@@ -15,7 +15,7 @@ from harness.bench.sensor import GELSIGHT_R15
 from harness.cli import invoke
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.touch.touch import open_touch
-from harness.objectfile.verify.verify import verify
+from harness.objectfile.verify import verify
 from harness.objects.household import build as named_object
 from harness.sim.gel.height_map import RasterMesh
 

@@ -14,9 +14,8 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
 from harness.objectfile.surface_search import SurfaceSearch
-from harness.objectfile.touch.graph import PatchCodes, codes_graph
+from harness.objectfile.touch.graph import PatchCodes, blur_matrix, codes_graph
 from harness.objectfile.touch.nodes import signatures
-from harness.objectfile.touch.skirt import blur_matrix
 from harness.sim.gel.gel import blur, deform, half_kernel
 from harness.sim.gel.height_map import RasterMesh
 from harness.sim.gel.press_pose import Presses

@@ -18,7 +18,7 @@ from harness.basics.mesh import Mesh
 from harness.cli import invoke
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.same_object import is_same_surface
-from harness.objectfile.verify.verify import verify
+from harness.objectfile.verify import verify
 from harness.objectfile.vision.coverage import is_closed
 from harness.objectfile.vision.network import NetworkSize
 from harness.objectfile.vision.render import open_vision

@@ -21,9 +21,8 @@ from harness.objectfile.published.sound import (
     spectrum_sounds,
     sum_modes,
 )
-from harness.objectfile.published.taxim_picture import TaximPicture, table_colours
-from harness.objectfile.published.touch import touch_images, touch_maps
-from harness.objectfile.verify.verify import verify
+from harness.objectfile.published.touch import TaximPicture, table_colours, touch_images, touch_maps
+from harness.objectfile.verify import verify
 from tests.samples.object_bench import egg_file
 from tests.samples.published_objects import committed_object, without_bounds
 

@@ -14,7 +14,7 @@ from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.basics.mesh import Mesh
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.surface_file import ply_bytes
-from harness.objectfile.verify.verify import verify
+from harness.objectfile.verify import verify
 from harness.objectfile.vision.network import VisionGrid
 from harness.objectfile.vision.part import VisionPart, with_vision
 from harness.objectfile.vision.render import VisionRenderer, open_vision

@@ -1,1 +1,0 @@
-"""Whether an ObjectFile is whole and says what it claims."""
