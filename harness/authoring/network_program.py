@@ -17,12 +17,7 @@ DEVICES = ("auto", "cpu", "cuda")
 
 
 def training_parser(description: str, profile: str) -> argparse.ArgumentParser:
-    """Create a parser with the options of every training.
-
-    Args:
-        description: docstring of the program.
-        profile: name of the default profile.
-    """
+    """Create a parser with the options of every training, ``profile`` being the default one."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument(
         "--profile", default=profile, help=f"amounts of samples and of the fit; {profile} if left out"
@@ -57,23 +52,13 @@ def chosen_networks(only: list[str] | None, networks: tuple[str, ...]) -> tuple[
 
 
 def require_torch(advice: str = "") -> None:
-    """Require torch.
-
-    Args:
-        advice: another way out, as the end of a sentence.
-
-    Raises:
-        WrongUse: torch is not installed.
-    """
+    """Raise ``WrongUse`` if torch is not installed; ``advice`` ends the sentence."""
     if find_spec("torch") is None:
         raise WrongUse(f"networks need torch to be trained: pip install '.[author]'{advice}")
 
 
 def device_of(asked: str) -> str:
-    """Return ``"cpu"`` or ``"cuda"``; needs torch.
-
-    Args:
-        asked: one of ``DEVICES``.
+    """Return ``"cpu"`` or ``"cuda"`` for one of ``DEVICES``; needs torch.
 
     Raises:
         WrongUse: ``"cuda"`` is asked for, and torch finds no such device.

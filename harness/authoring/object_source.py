@@ -1,6 +1,5 @@
 """What an ObjectFile is built from: a mesh's origin, and the folder's object."""
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Literal
 
 from harness.basics.code_version import content_hash
 from harness.basics.errors import WrongUse
+from harness.basics.files.foreign_file import sha256_of
 from harness.basics.files.named_file import require_file
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
@@ -40,14 +40,7 @@ def provenance_of(
     settings: Mapping[str, str | float | int | bool | None],
     sources: tuple[Source, ...],
 ) -> Provenance:
-    """How a part came to be: by which code, from what, with which seed and settings.
-
-    Args:
-        wanted: what was asked for.
-        part: whose builder is ``harness.authoring.audio.object_audio`` and so on.
-        settings: with which it was trained.
-        sources: of the mesh, and of whatever else went into the part.
-    """
+    """State by which code, from which sources, with which seed and settings a part was built."""
     builder = f"harness.authoring.{part}.object_{part}"
     return Provenance(
         code={builder: content_hash(builder)},
@@ -59,11 +52,7 @@ def provenance_of(
 
 
 def source_of(mesh: str, licence: str) -> Source:
-    """Where a mesh comes from; with a hash where it is a file.
-
-    Args:
-        mesh: a file, or ``builtin:`` and a name.
-        licence: of the mesh.
+    """Return the source of a mesh, a file or ``builtin:`` and a name; with the hash of a file.
 
     Raises:
         WrongUse: there is no such file.
@@ -72,22 +61,13 @@ def source_of(mesh: str, licence: str) -> Source:
         return Source(what="mesh", origin=mesh, licence=licence)
     path = Path(mesh)
     require_file(path, "file", f"say a mesh file, or {BUILTIN} and a name")
-    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
-    return Source(what="mesh", origin=path.name, licence=licence, sha256=sha256)
+    return Source(what="mesh", origin=path.name, licence=licence, sha256=sha256_of(path))
 
 
 def created_object(
     origin: str, licence: str, material: Material, mesh: Mesh, out: Path, source: Source
 ) -> ObjectFile:
-    """The folder's object, made where there is none.
-
-    Args:
-        origin: a file, or ``builtin:`` and a name.
-        licence: of the mesh.
-        material: it is of.
-        mesh: its surface.
-        out: the folder.
-        source: of the mesh.
+    """Open the object in the folder ``out``, or create it where there is none.
 
     Raises:
         WrongUse: the folder holds an object of another mesh or material.

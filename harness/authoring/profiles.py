@@ -14,12 +14,7 @@ def find_profile(
 ) -> Profile:
     """Return the profile of that name.
 
-    Args:
-        profiles: of the sense.
-        name: of a profile.
-        sense: is named in messages.
-        removed: profiles of earlier versions, whose networks ``standard`` replaces.
-        advice: where else to look, as the end of a sentence.
+    ``removed`` profiles of earlier versions are replaced by ``standard``; ``advice`` ends a refusal.
 
     Raises:
         WrongUse: there is none.

@@ -57,15 +57,9 @@ def author_audio(
     report: Report,
     threads: int = 1,
 ) -> AuthoredAudio:
-    """Make and measure a network.
+    """Make and measure a network for canonical modes (``data.canonical``) with ``(m,)`` dampings in 1/s.
 
-    Args:
-        modes: of the object, canonical (``audio_data.canonical``).
-        dampings: ``(m,)`` 1/s.
-        profile: which network.
-        seed: of the split and of the waves.
-        report: told of progress.
-        threads: of the fit.
+    ``seed`` is that of the split and of the waves, ``threads`` are those of the fit.
     """
     split = split_nodes(len(modes.points), seed=seed)
     seconds: dict[str, float] = {}
@@ -138,7 +132,7 @@ def opened(graph: ModelProto, modes: int) -> Network:
 def _sound_errors(
     modes: Modes, dampings: FloatArray, split: Split, shapes: AnyArray, chosen: AnyArray
 ) -> dict[str, float]:
-    """The medians over the chosen nodes; empty where no mode is heard."""
+    """Compute medians over the chosen nodes; empty where no mode is audible."""
     if not audible(modes.frequencies, RATE).any():
         return {}
     nodes = split.held_out[chosen]
@@ -161,12 +155,8 @@ def waves_graph(network: Waves, storage: Storage = "float32") -> ModelProto:
     """Plane waves as a graph, from points in metres to the shapes of the modes there.
 
     Points are float64: an object scanned far from its origin would lose the digits that tell its points apart
-    before they are normalised.
-
-    Args:
-        network: to write.
-        storage: of the linear layer in the file; the waves themselves are float32, as a wave
-            vector that is off turns far ends of the object.
+    before they are normalised. The linear layer has the storage type, the waves themselves are float32: an
+    error of a wave vector is large at the far ends of the object.
     """
     modes = network.weights.shape[1] // 3
     nodes = Nodes(storage)

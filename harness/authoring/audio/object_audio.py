@@ -65,14 +65,10 @@ class BuiltAudio:
 def build_audio(
     wanted: AudioRequest, out: Path, store: Store | None, report: Report, threads: int = 1
 ) -> BuiltAudio:
-    """Build an object's sound, or go on with a build that was stopped.
+    """Build an object's sound, or continue a build that was stopped.
 
-    Args:
-        wanted: what.
-        out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
-        store: where modes are kept, so that a build that is begun again need not solve again.
-        report: told of progress.
-        threads: of the fit.
+    The folder ``out`` keeps its other modalities and its mesh; modes are kept in ``store``, so that a build
+    that is begun again need not solve again.
 
     Raises:
         WrongUse: options that cannot be.
@@ -128,7 +124,10 @@ def _modes(
         is_file = source.sha256 is not None
         volume = is_file and read_volume(Path(wanted.mesh), wanted.units, wanted.up_axis) is not None
     if volume:
-        mesh, modes, said = _of_volume(wanted, begin)
+        given = Path(wanted.mesh), wanted.material, wanted.units, wanted.wall, wanted.limit
+        solved = modes_of_file(*given, edge=wanted.edge, begin=begin, up_axis=wanted.up_axis)
+        modes, said = solved.solution.modes, solved.notes
+        mesh = Mesh(modes.points, modes.faces)
     else:
         with timed(whole, "intake"):
             taken = surface_of(wanted.mesh, wanted.units, wanted.wall, wanted.up_axis)
@@ -144,22 +143,6 @@ def _modes(
             if before + old in modes.seconds:
                 seconds[before + new] = modes.seconds[before + old]
     return mesh, modes, source, said
-
-
-def _of_volume(wanted: AudioRequest, begin: Begin) -> tuple[Mesh, Modes, tuple[str, ...]]:
-    path = Path(wanted.mesh)
-    solved = modes_of_file(
-        path,
-        wanted.material,
-        wanted.units,
-        wanted.wall,
-        wanted.limit,
-        edge=wanted.edge,
-        begin=begin,
-        up_axis=wanted.up_axis,
-    )
-    modes = solved.solution.modes
-    return Mesh(modes.points, modes.faces), modes, solved.notes
 
 
 def _lowest(modes: Modes, most: int) -> Modes:

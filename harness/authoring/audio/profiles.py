@@ -39,9 +39,5 @@ PROFILES: Mapping[str, AudioProfile] = MappingProxyType({
 
 
 def profile(name: str) -> AudioProfile:
-    """The profile of that name.
-
-    Raises:
-        WrongUse: there is none.
-    """
+    """Return the profile of that name; ``WrongUse`` if there is none."""
     return find_profile(PROFILES, name, "audio", removed=("small", "paper"))

@@ -96,16 +96,16 @@ def fit_waves(
     reaches: tuple[float, ...],
     storage: Storage = "float32",
 ) -> FittedWaves:
-    """The network of the reach that predicts best what it was not shown.
+    """Fit a network of ``width`` waves for each of the reaches, and return the one that predicts best.
 
     Args:
-        samples: to learn.
-        measured: samples by which is chosen (``solve_readout``).
-        number: rad/m, the object's wave number (``wave_number``).
-        width: waves.
-        seed: of their vectors and phases.
-        reaches: that are tried, such as ``audio_profiles.REACHES``.
-        storage: of the linear layer in the file.
+        samples: places and shapes to learn.
+        measured: samples that the choice is made by (``solve_readout``).
+        number: the object's wave number (``wave_number``), rad/m.
+        width: number of waves.
+        seed: random seed of their vectors and phases.
+        reaches: standard deviations of the vectors along an axis, relative to the wave number.
+        storage: storage type of the linear layer in the file.
     """
     targets = samples.shapes.reshape(len(samples.points), -1)
     low, high = samples.points.min(axis=0), samples.points.max(axis=0)
@@ -131,14 +131,7 @@ def fit_enough_waves(
     """As ``fit_waves``; with twice the waves while the error foretold is above ``ENOUGH``.
 
     Twice the waves reach farther by the square root of two at the same density on a surface, so that
-    this is tried beside the reach that was best before.
-
-    Args:
-        samples: to learn.
-        measured: samples by which is chosen.
-        number: rad/m, the object's wave number.
-        spec: how many waves, how they are stored, and what reaches are tried of the fewest.
-        seed: of vectors and phases.
+    this is tried beside the reach that was best before. ``spec`` states how many waves are tried first.
     """
     width = spec.width
     best = fit_waves(samples, measured, number, width, seed, spec.reaches, spec.storage)

@@ -46,11 +46,7 @@ def build_plan(
 ) -> BuildPlan:
     """Compare a catalogue with what is on the disk; reads every mesh once, for its hash.
 
-    Args:
-        rows: with their meshes.
-        spec: what is built.
-        of: the build's folder.
-        retry: whether objects that failed are tried again.
+    With ``retry`` objects that failed are tried again.
 
     Raises:
         WrongUse: a spec that cannot be built, or a mesh that is not there.
@@ -107,16 +103,10 @@ def held(of: BuildFolder) -> Iterator[None]:
 
 
 class LocalRunner:
-    """Processes of this machine, each with one object at a time.
-
-    Args:
-        workers: how many.
-        limits: of each.
-    """
+    """Processes of this machine, each with one object at a time."""
 
     def __init__(self, workers: int, limits: WorkerLimits) -> None:
-        self._workers = workers
-        self._limits = limits
+        self._workers, self._limits = workers, limits
 
     def run(self, jobs: Iterable[Job]) -> Iterator[ObjectRecord]:
         """As ``Runner.run``."""
@@ -124,25 +114,21 @@ class LocalRunner:
         workers: list[ObjectWorker] = []
         try:
             while waiting or any(worker.job for worker in workers):
-                self._hand_out(waiting, workers)
+                idle = [worker for worker in workers if worker.job is None]
+                while waiting and (idle or len(workers) < self._workers):
+                    if not idle:
+                        workers.append(ObjectWorker(self._limits))
+                        idle.append(workers[-1])
+                    idle.pop().begin(*waiting.popleft())
                 yield from self._finished(waiting, workers)
         finally:
             for worker in workers:
                 worker.stop()
 
-    def _hand_out(self, waiting: deque[tuple[Job, int]], workers: list[ObjectWorker]) -> None:
-        """A job for every idle worker; a worker for every job, up to their number."""
-        idle = [worker for worker in workers if worker.job is None]
-        while waiting and (idle or len(workers) < self._workers):
-            if not idle:
-                workers.append(ObjectWorker(self._limits))
-                idle.append(workers[-1])
-            idle.pop().begin(*waiting.popleft())
-
     def _finished(
         self, waiting: deque[tuple[Job, int]], workers: list[ObjectWorker]
     ) -> Iterator[ObjectRecord]:
-        """Wait for something to end, and take all that has; what died once waits again."""
+        """Wait until a job ends, and yield the records of all that have; a job that died once waits again."""
         busy = [worker for worker in workers if worker.job is not None]
         wait_for(busy)
         for worker in busy:

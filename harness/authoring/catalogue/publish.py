@@ -1,7 +1,7 @@
 """ObjectFiles of a build, copied to a folder or to any address that fsspec has a driver for."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -46,18 +46,16 @@ class ObjectStore:
         The description goes last, and an older one is taken away first: whatever stops the copy, an object
         with a description has all files that it names.
 
-        Args:
-            folder: of the ObjectFile.
-            record: of its build, which names its files.
-
         Raises:
             DataRefused: a file is not the one that was built.
             OSError: the store refused it.
         """
         place = f"{self._root.rstrip('/')}/{record.name}"
         description = f"{place}/{DESCRIPTION}"
-        if self._holds(description, record.object_json_sha256):
-            return 0
+        with _named(description), suppress(FileNotFoundError):
+            data: bytes = self._system.cat_file(description)
+            if sha256(data).hexdigest() == record.object_json_sha256:
+                return 0
         with _named(description):
             self._system.makedirs(place, exist_ok=True)
             if self._system.exists(description):
@@ -67,15 +65,6 @@ class ObjectStore:
             self._send(folder / name, f"{place}/{name}", expected)
             for name, expected in (*sums.items(), (DESCRIPTION, record.object_json_sha256))
         )
-
-    def _holds(self, description: str, expected: str) -> bool:
-        """Whether an object is there: its description by its bytes, and so every file sent before it."""
-        with _named(description):
-            try:
-                data: bytes = self._system.cat_file(description)
-            except FileNotFoundError:
-                return False
-        return sha256(data).hexdigest() == expected
 
     def _send(self, path: Path, to: str, expected: str) -> int:
         data = path.read_bytes()
@@ -100,12 +89,9 @@ def _named(path: str) -> Iterator[None]:
 def publish(
     of: BuildFolder, store: ObjectStore, on: Callable[[str, float], None] = lambda *_: None
 ) -> list[SentObject]:
-    """Copy every object of a build that stands and is not there yet.
+    """Copy every object of a build, which may be running, that stands and is not there yet.
 
-    Args:
-        of: the build; it may be running.
-        store: to copy to.
-        on: gets the name and the share that is done before each object.
+    ``on`` gets the name and the fraction that is done before each object.
 
     Raises:
         WrongUse: nothing was built into the folder.

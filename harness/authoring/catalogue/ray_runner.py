@@ -49,7 +49,7 @@ class RayRunner:
             WrongUse: Ray is not installed.
             BenchFault: there is no cluster at the address.
         """
-        ray = _imported()
+        ray = _import_ray()
         self._connect(ray)
         remote = ray.remote(num_cpus=1, max_retries=NODES_LOST)(_build)
         waiting, running = iter(jobs), dict[Any, Job]()
@@ -93,7 +93,7 @@ class RayRunner:
         return _AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
 
 
-def _imported() -> Any:
+def _import_ray() -> Any:
     # Ray reports its use over the network unless this is set before it is imported.
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:
@@ -119,17 +119,14 @@ def _record(ray: Any, reference: Any, job: Job) -> ObjectRecord:
 def _build(job: Job, limits: WorkerLimits) -> ObjectRecord:
     """On a node: build one object in this Ray worker's own process."""
     worker = _own_worker(limits)
-    record = None
-    for attempt in range(1, ATTEMPTS + 1):
+    attempt = 0
+    while True:
+        attempt += 1
         worker.begin(job, attempt)
-        record = worker.poll()
-        while record is None:
+        while (record := worker.poll()) is None:
             wait_for([worker])
-            record = worker.poll()
-        if record.outcome not in RETRIED:
-            break
-    assert record is not None
-    return record
+        if record.outcome not in RETRIED or attempt == ATTEMPTS:
+            return record
 
 
 @cache

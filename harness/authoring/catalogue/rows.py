@@ -336,11 +336,7 @@ def read_toml_rows(path: Path) -> list[tuple[str, dict[str, str]]]:
 
 
 class MeshFolder:
-    """The meshes below a folder by the names that rows may have: its files, and folders of one object each.
-
-    Args:
-        folder: is listed once.
-    """
+    """The meshes below a folder by the names that rows may have: files, and folders of one object each."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -351,16 +347,13 @@ class MeshFolder:
     def find(self, row: CatalogueRow) -> str | None:
         """A mesh's path or ``builtin:`` name; None where there is none."""
         if row.mesh is not None:
-            return row.mesh if row.mesh.startswith(BUILTIN) else self._named(row.mesh)
+            file = self.folder / row.mesh
+            return row.mesh if row.mesh.startswith(BUILTIN) else str(file) if file.is_file() else None
         for name in filter(None, (row.name.lower(), row.number.lower())):
             path = self._files.get(name) or self._in_folder(name)
             if path is not None:
                 return str(path)
         return None
-
-    def _named(self, mesh: str) -> str | None:
-        path = self.folder / mesh
-        return str(path) if path.is_file() else None
 
     def _in_folder(self, name: str) -> Path | None:
         """The one that is named as usual, or the only one."""
@@ -375,12 +368,7 @@ class MeshFolder:
 def with_meshes(
     rows: Iterable[CatalogueRow], folder: Path
 ) -> tuple[list[tuple[CatalogueRow, str]], list[ExcludedRow]]:
-    """Rows with their meshes, and those without one.
-
-    Args:
-        rows: of a catalogue.
-        folder: of meshes.
-    """
+    """Return rows with their meshes in a folder, and those without one."""
     meshes = MeshFolder(folder)
     found: list[tuple[CatalogueRow, str]] = []
     excluded: list[ExcludedRow] = []

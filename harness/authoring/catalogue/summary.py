@@ -56,12 +56,9 @@ def _summary(of: BuildFolder, name: str) -> ObjectSummary:
 
 
 def _quality(description: Description) -> dict[str, float]:
-    networks = description.networks
-    found: dict[str, float] = {}
-    for key, (sense, _, factor) in QUALITY.items():
-        for name, entry in networks.items():
-            # Touch has networks of several names.
-            of_sense = name if name in ("audio", "vision") else "touch"
-            if of_sense == sense and key in entry.measured:
-                found.setdefault(key, factor * entry.measured[key])
-    return found
+    measured = {sense: entry.measured for sense, entry in description.networks.items()}
+    return {
+        key: factor * measured[sense][key]
+        for key, (sense, _, factor) in QUALITY.items()
+        if key in measured.get(sense, {})
+    }

@@ -43,13 +43,7 @@ _CLOCK = "seconds"
 def build_object(item: BuildItem, spec: BuildSpec, of: BuildFolder, report: Report) -> ObjectRecord:
     """Build an object from its stages, those that are missing first; its record is on the disk too.
 
-    A named failure is an outcome, not an exception: it is recorded, and other objects go on.
-
-    Args:
-        item: the object.
-        spec: what is built.
-        of: the build's folder.
-        report: takes progress.
+    A named failure is an outcome, not an exception: it is recorded, and other objects are built.
     """
     begun = time.perf_counter()
     try:
@@ -181,13 +175,6 @@ def sense_stage(
     """Build a sense, or find it built.
 
     The folder is a pure function of its key: numbers that a clock measured are in the record alone.
-
-    Args:
-        sense: one of the spec's.
-        item: the object.
-        spec: what is built.
-        of: the build's folder.
-        report: takes progress.
 
     Raises:
         WrongUse: options that cannot be.

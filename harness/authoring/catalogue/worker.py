@@ -42,11 +42,7 @@ class Job:
 
 
 class ObjectWorker:
-    """A process that builds objects, replaced when it hangs or dies; one job at a time.
-
-    Args:
-        limits: of every job.
-    """
+    """A process that builds objects, replaced when it hangs or dies; one job at a time."""
 
     def __init__(self, limits: WorkerLimits) -> None:
         self._limits = limits

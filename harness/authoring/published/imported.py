@@ -6,9 +6,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from harness.authoring.published.layout import FileTable, State, format_of
+from harness.authoring.published.layout import FileTable, ImportedParts, State, format_of
 from harness.authoring.published.look import take_first_look, take_look
-from harness.authoring.published.parts import ImportedParts
 from harness.authoring.published.reader import read_container
 from harness.basics.arrays import FloatArray
 from harness.basics.code_version import content_hash
@@ -73,14 +72,7 @@ def import_published(
 
 
 def written(parts: ImportedParts, kind: Format, source: Source, name: str, out: Path) -> PublishedObject:
-    """Write the folder of what was gathered.
-
-    Args:
-        parts: parts of a file.
-        kind: version of the file.
-        source: the file.
-        name: name of the object.
-        out: the folder, made.
+    """Write the parts of a file to the folder ``out``, which is created.
 
     Raises:
         DataRefused: the parts do not hold together.

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.authoring.published.layout import FileTable, State
-from harness.authoring.published.parts import ImportedParts
+from harness.authoring.published.layout import FileTable, ImportedParts, State
 from harness.basics.arrays import BoolArray
 from harness.basics.errors import DataRefused
 from harness.objectfile.entries import Domain, NetworkEntry

@@ -33,15 +33,10 @@ _CHUNK = 64
 
 
 def choose_nodes(mesh: Mesh, spacing: float, seed: int = 0) -> SurfaceNodes:
-    """Places so dense that every place of the surface has one near, with a normal like its own.
+    """Choose places so dense that every place of the surface has one near, with a normal like its own.
 
-    Random places, each kept if none before it is within ``spacing`` of it. Normals that differ
+    Random places, each kept if none before it is within ``spacing``, in m, of it. Normals that differ
     count as distance (``touch_nodes.BEND``), so both sides of an edge have places of their own.
-
-    Args:
-        mesh: of the object.
-        spacing: m, greater than zero.
-        seed: of the places.
 
     Raises:
         WrongUse: a spacing that is not positive.

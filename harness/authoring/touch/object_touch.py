@@ -36,13 +36,7 @@ class BuiltTouch:
 
 
 def build_touch(wanted: TouchRequest, out: Path, report: Report, threads: int = 1) -> BuiltTouch:
-    """Build an object's touch.
-
-    Args:
-        wanted: what.
-        out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
-        report: told of progress.
-        threads: of the coding.
+    """Build an object's touch into the folder ``out``, which keeps its other modalities and its mesh.
 
     Raises:
         WrongUse: options that cannot be.

@@ -34,9 +34,5 @@ presses as ``standard``."""
 
 
 def touch_profile(name: str) -> TouchProfile:
-    """The profile of that name.
-
-    Raises:
-        WrongUse: there is none.
-    """
+    """Return the profile of that name; ``WrongUse`` if there is none."""
     return find_profile(TOUCH_PROFILES, name, "touch", removed=("paper",))

@@ -75,16 +75,7 @@ def author_touch(
     report: Report,
     threads: int = 1,
 ) -> AuthoredTouch:
-    """Make and measure the codes of one object's touch.
-
-    Args:
-        mesh: of the object.
-        sensor: a flat gel.
-        skirt: of the gel, in its pixels.
-        profile: of the codes.
-        seed: of nodes and presses.
-        report: told of progress.
-        threads: of the coding.
+    """Make and measure the codes of one object's touch, for a flat gel and its skirt in pixels.
 
     Raises:
         WrongUse: a file too small for any codes of this object.
@@ -179,13 +170,9 @@ class PatchSpec:
 def code_surface(
     raster: RasterMesh, nodes: SurfaceNodes, sensor: TactileSensor, spec: PatchSpec
 ) -> CodedSurface:
-    """Look at a surface from its nodes, and code what is seen.
+    """Code the surface around its nodes (``choose_nodes`` with the same spacing).
 
-    Args:
-        raster: of the object.
-        nodes: of its surface (``touch_data.choose_nodes`` with the same spacing).
-        sensor: whose window the patches cover, however it is turned.
-        spec: of patches and codes.
+    Patches cover the window of the sensor at any yaw.
 
     Raises:
         WrongUse: no node is to be seen.

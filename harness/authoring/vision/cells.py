@@ -2,24 +2,25 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
-from harness.authoring.vision.batch import batch_of
-from harness.authoring.vision.cell_lessons import CellLessons
-from harness.authoring.vision.kernels import teach
+from harness.authoring.vision.kernels import Lesson, batch_of, encode, teach
 from harness.authoring.vision.layers import (
     first_weights,
     layer_shapes,
     layers_of,
+    octave_factors,
     parameter_count,
     weights_of,
 )
 from harness.authoring.vision.lessons import Lessons
 from harness.authoring.vision.profiles import CellsSpec
-from harness.basics.arrays import AnyArray
+from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.cores import own_cores
 from harness.basics.errors import DataRefused
 from harness.basics.files.foreign_file import refused_as
@@ -63,7 +64,7 @@ class CellTraining:
     ) -> None:
         self.spec, self.grid, self.scale, self.seed = spec, grid, density_scale, seed
         self.threads = own_cores() if threads is None else threads
-        self.by_cell = CellLessons(spec.size, grid, lessons, lamps, spec.overlap, spec.least)
+        self.by_cell = CellLessons(spec, grid, lessons, lamps)
         """what each learns from."""
         self.flats = np.zeros((len(grid), parameter_count(spec.size)), np.float32)
         """``(networks, parameters)`` float32."""
@@ -141,3 +142,71 @@ class CellTraining:
             int(state >> np.uint64(1)),
         )
         return float(loss)
+
+
+class CellLessons:
+    """Lessons by cell: of the places in it, a little beyond its border, or the nearest if those are few."""
+
+    def __init__(self, spec: CellsSpec, grid: VisionGrid, lessons: Lessons, lamps: AnyArray) -> None:
+        self._size, self._grid, self._lessons, self._lamps = spec.size, grid, lessons, lamps
+        self._least = spec.least
+        owners, self._places = _owned((lessons.points - grid.low) / grid.cell, grid, spec.overlap)
+        self._starts = np.searchsorted(owners, np.arange(len(grid) + 1))
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self._lessons.points)
+
+    def lesson(self, cell: int) -> Lesson:
+        """Gather the lesson of a cell."""
+        lessons, grid = self._lessons, self._grid
+        at = self._places[self._starts[cell] : self._starts[cell + 1]]
+        if len(at) < self._least:
+            middle = grid.low + grid.cell * (grid.cells[cell] + 0.5)
+            near = self._tree.query(middle, min(self._least, len(lessons)))[1]
+            at = np.union1d(at, np.atleast_1d(near))
+        return Lesson(
+            *(self._encoded(cell, at), self._told(at), lessons.normals[at], lessons.colours[at]),
+            *(lessons.depth[at], lessons.weight[at], self._lamps),
+        )
+
+    def _encoded(self, cell: int, at: IntArray) -> AnyArray:
+        # -1 to 1 in a cell, and on beyond its border.
+        grid, points = self._grid, self._lessons.points[at]
+        place = np.asarray(2.0 * ((points - grid.low) / grid.cell - grid.cells[cell]) - 1.0, np.float32)
+        encoded = np.empty((len(at), self._size.place), np.float32)
+        encode(place, octave_factors(self._size), 0, encoded)
+        return encoded
+
+    def _told(self, at: IntArray) -> AnyArray:
+        """What places with lamps of their own tell the later layer; nothing where lamps are drawn anew."""
+        size, lessons = self._size, self._lessons
+        if not lessons.lamps.shape[1]:
+            return np.empty((len(at), 0), np.float32)
+        told = np.empty((len(at), layer_shapes(size).told[0]), np.float32)
+        ones, first = np.ones(size.turns, np.float32), 0
+        if size.kind == "osf":
+            encode(lessons.views[at], ones, first, told)
+            first = size.direction
+        encode(lessons.lamps[at], ones, first, told)
+        if size.extras:
+            told[:, first + size.direction :] = np.hstack([lessons.seen[at], lessons.normals[at]])
+        return told
+
+
+def _owned(scaled: FloatArray, grid: VisionGrid, overlap: float) -> tuple[IntArray, IntArray]:
+    """Cells, ascending, and the places that are within ``overlap`` of each."""
+    least, most = (np.floor(scaled + by).astype(np.int64) for by in (-overlap, overlap))
+    owners, places = [], []
+    for corner in np.ndindex(2, 2, 2):
+        further = np.array(corner, np.bool_)
+        # A place that is near no border along an axis is counted once.
+        cells = np.where(further, most, least)
+        there = np.flatnonzero(np.all(~further | (most != least), axis=1))
+        inside = there[np.all((cells[there] >= 0) & (cells[there] < grid.shape), axis=1)]
+        network = grid.table[tuple(cells[inside].T)]
+        owners.append(network[network >= 0])
+        places.append(inside[network >= 0])
+    owner, place = np.concatenate(owners), np.concatenate(places)
+    order = np.lexsort((place, owner))
+    return owner[order].astype(np.int64), place[order]

@@ -47,12 +47,7 @@ class Way:
 
 
 def ways(spec: CellsSpec, side: int) -> tuple[Way, ...]:
-    """The default, then every knob at every other level.
-
-    Args:
-        spec: of the networks that all but the knobs of networks ask.
-        side: pixels of all pictures but those of the knob of that name.
-    """
+    """Return the default, of networks ``spec`` and ``side`` pixels, then every knob at every other level."""
     plain = Way(DEFAULT, DEFAULT, spec, side)
     drawn: list[tuple[str, str, RenderSettings]] = [
         *(("coverage, sub-pixels", str(of), RenderSettings(coverage=of)) for of in COVERS),
@@ -105,13 +100,7 @@ class Studio:
     _exact: dict[int, list[LinearImage]] = field(default_factory=dict)
 
     def train(self, spec: CellsSpec, seed: int, folder: Path, report: Report) -> None:
-        """Take networks from the folder where they are there; a training that was killed goes on.
-
-        Args:
-            spec: of their training.
-            seed: of all that is drawn.
-            folder: exists.
-            report: told of progress.
+        """Take networks from an existing folder, or train them there; a training that was killed continues.
 
         Raises:
             DataRefused: a file of that name that is of something else.
@@ -165,14 +154,7 @@ class Studio:
 
 
 def measured(asked: Sequence[Way], studio: Studio, repeat: int, report: Report) -> tuple[PictureCost, ...]:
-    """Errors and seconds of each way.
-
-    Args:
-        asked: ways to a picture.
-        studio: with their networks.
-        repeat: times that every picture is drawn for its seconds, one or more.
-        report: told of progress.
-    """
+    """Measure errors and seconds of each way, whose networks the studio has; pictures are timed repeatedly."""
     worth = []
     for number, way in enumerate(asked):
         report("comparing pictures", 0.5 * number / len(asked))

@@ -63,16 +63,7 @@ class HeldOutViews:
 def held_out_pictures(
     mesh: Mesh, count: int, width: int, height: int, seed: int, distance: float = 2.0, apart: float = APART
 ) -> HeldOutViews:
-    """Cameras all around an object, each with a light of its own.
-
-    Args:
-        mesh: of the object; its box's middle is in the middle of every picture.
-        count: of pictures, one or more.
-        width: columns of pixels.
-        height: rows of pixels.
-        seed: of the cameras and the lights.
-        distance: of the cameras, in diagonals of the object's box; more than a half.
-        apart: rad, as of ``HeldOutViews``.
+    """Sample one or more cameras all around an object, each with a light of its own; see ``around``.
 
     Raises:
         WrongUse: no picture, or a camera inside the object's box.

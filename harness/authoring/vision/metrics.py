@@ -14,13 +14,7 @@ BEHIND = 1.0
 
 
 def reference_pictures(lit: LitObject, held_out: HeldOutViews, samples: int) -> list[LinearImage]:
-    """Exact ones, anti-aliased.
-
-    Args:
-        lit: the object.
-        held_out: one picture for each camera and its light.
-        samples: a side of a pixel.
-    """
+    """Render an exact picture for each camera and its light, with ``samples`` along a side of a pixel."""
     return [
         lit.render(camera, [light], samples).image
         for camera, light in zip(held_out.cameras, held_out.lights, strict=True)

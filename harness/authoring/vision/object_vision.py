@@ -40,13 +40,9 @@ def build_vision(
     report: Report,
     threads: int | None = None,
 ) -> BuiltVision:
-    """Build an object's look, or go on with a training that was stopped.
+    """Build an object's look, or continue a training that was stopped; threads are all cores if None.
 
-    Args:
-        wanted: what, by a profile of ``vision_profiles.VISION_PROFILES``.
-        out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
-        report: told of progress.
-        threads: of a training; None for as many as the process has cores.
+    The folder ``out`` keeps its other modalities and its mesh.
 
     Raises:
         WrongUse: options that cannot be.
@@ -78,14 +74,10 @@ def build_vision(
 
 
 def drawn_surface(mesh: Mesh, looked_at: Mesh) -> Mesh | None:
-    """What pictures are to be drawn along; None where the object's mesh will do.
+    """Return the surface that pictures are rendered along; None where the object's mesh will do.
 
     A look's surface comes with seams where its texture has them; they are closed, since which pixels a
     closed surface covers is found faster, and an eye within it is noticed.
-
-    Args:
-        mesh: of the object, in metres.
-        looked_at: of its look, in metres.
     """
     return None if is_same_surface(mesh, looked_at) else without_seams(looked_at)
 

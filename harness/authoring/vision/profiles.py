@@ -80,9 +80,5 @@ VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
 
 
 def vision_profile(name: str) -> VisionProfile:
-    """The profile of that name.
-
-    Raises:
-        WrongUse: there is none.
-    """
+    """Return the profile of that name; ``WrongUse`` if there is none."""
     return find_profile(VISION_PROFILES, name, "vision")

@@ -44,15 +44,9 @@ def author_vision(
     report: Report,
     threads: int | None = None,
 ) -> AuthoredVision:
-    """Make and measure the networks of one object's look.
+    """Make and measure the networks of one object's look; they are the same for any number of threads.
 
-    Args:
-        look: of the object.
-        profile: which networks.
-        seed: of all that is drawn: pictures kept back, places, lamps, first weights.
-        folder: where a checkpoint is kept; a training that was killed goes on from it, to the same bits.
-        report: told of progress.
-        threads: None for as many as the process has cores; the networks are the same for any number.
+    A training that was killed continues from its checkpoint in the folder, to the same bits.
 
     Raises:
         MeshRefused: a surface without extent.
@@ -92,15 +86,8 @@ def train_networks(
 ) -> CellTraining:
     """Train an object's networks without measuring their errors; raises as ``author_vision``.
 
-    Args:
-        lit: the object.
-        held_out: views that no training sample is close to.
-        spec: specification of the networks.
-        seed: random seed.
-        checkpoint: file from which an interrupted training continues; it is left in place.
-        report: receives the progress.
-        threads: number of threads; None for all cores of the process.
-        clock: receives the seconds by stage.
+    No training sample is close to a view of ``held_out``; an interrupted training continues from the file
+    ``checkpoint``, which is left in place; ``clock`` receives the seconds by stage.
     """
     clock = Laps() if clock is None else clock
     report("drawing places", 0.0)

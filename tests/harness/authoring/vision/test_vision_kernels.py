@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.authoring.vision.batch import Lesson, batch_of, encode
-from harness.authoring.vision.kernels import _adam, _back, _forth, _wrong
+from harness.authoring.vision.kernels import Lesson, _adam, _back, _forth, _wrong, batch_of, encode
 from harness.authoring.vision.layers import (
     first_weights,
     layer_shapes,
