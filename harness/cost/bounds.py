@@ -28,15 +28,11 @@ _LEAST_SPREAD = 0.05
 
 
 def predicted_at_most(values: FloatArray, share: float = KEPT) -> float:
-    """What the next of such positive values stays below with probability ``share``.
+    """Return what the next of ``(n,)`` such positive values, n >= 2, is below with probability ``share``.
 
     The one-sided prediction bound for one future observation, of the logarithms taken as normal
     (Hahn and Meeker, Statistical Intervals, 1991, section 4.6):
     ``exp(m + t(share, n - 1) s sqrt(1 + 1 / n))``.
-
-    Args:
-        values: ``(n,)``, n at least 2.
-        share: between one half and 1.
     """
     count = len(values)
     if count < 2 or not (np.isfinite(values).all() and (values > 0.0).all()):
@@ -94,7 +90,8 @@ def _most_of_the_rest(point: Point, name: str | None, work: float | None) -> flo
     logarithms, and the variance what is left about it, see ``harness.cost.bounds``.
     """
     found = lines(point, by_work=work is not None)
-    if name is None or name not in found.of or found.pooled < _ENOUGH:
+    pooled = sum(len(line.rest) - 1 for line in found.of.values())
+    if name is None or name not in found.of or pooled < _ENOUGH:
         return predicted_at_most(np.array([sample.cpu for sample in point.samples]))
     own = found.of[name]
     freedom = len(own.rest) - 1
@@ -142,21 +139,12 @@ class ParallelLines:
     squares: float
     """of the works about their objects' means, summed; 0 where work is not looked at or alike."""
 
-    @property
-    def pooled(self) -> int:
-        """Runs beyond the first of each object."""
-        return sum(len(line.rest) - 1 for line in self.of.values())
-
 
 def lines(point: Point, by_work: bool) -> ParallelLines:
-    """Parallel lines of the logarithm of seconds over that of work, one an object, by least squares.
+    """Fit parallel lines of the logarithm of seconds over that of work, one an object, by least squares.
 
-    An analysis of covariance (Montgomery, Design and Analysis of Experiments, section 15.3).
-
-    Args:
-        point: the setting.
-        by_work: whether to look at work; without, or where a run of the setting has none, all lines
-            are level and the rest is what is left about the object's mean.
+    An analysis of covariance (Montgomery, Design and Analysis of Experiments, section 15.3). Lines are level
+    if not ``by_work``, or if a run has no work.
     """
     by_work = by_work and all(sample.work is not None for sample in point.samples)
     groups: dict[str, list[tuple[float, float]]] = {}
@@ -170,9 +158,8 @@ def lines(point: Point, by_work: bool) -> ParallelLines:
         squares = slope = 0.0
     else:
         slope = float(np.clip(aside[:, 0] @ aside[:, 1] / squares, 0.0, _STEEPEST))
-    return ParallelLines({name: _line(pairs, slope) for name, pairs in arrays.items()}, slope, squares)
-
-
-def _line(pairs: FloatArray, slope: float) -> ObjectLine:
-    work, seconds = pairs.mean(axis=0)
-    return ObjectLine(float(work), float(seconds), pairs[:, 1] - seconds - slope * (pairs[:, 0] - work))
+    fitted = {}
+    for name, pairs in arrays.items():
+        work, seconds = pairs.mean(axis=0).tolist()
+        fitted[name] = ObjectLine(work, seconds, pairs[:, 1] - seconds - slope * (pairs[:, 0] - work))
+    return ParallelLines(fitted, slope, squares)

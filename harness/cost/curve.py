@@ -158,13 +158,9 @@ def best_within(
     prices: Mapping[str, float] | None = None,
     errors: Mapping[str, float] | None = None,
 ) -> Point | None:
-    """The setting of least error that costs at most ``seconds``; None where none does.
+    """Return the setting of least error that costs at most ``seconds``; None if none does.
 
-    Args:
-        points: of one condition.
-        seconds: above zero.
-        prices: s by name of a point, instead of its measured mean.
-        errors: m by name of a point, instead of its measured mean: of one object, where one is touched.
+    ``prices`` in s and ``errors`` in m by name of a point stand for its measured means.
     """
     if not (np.isfinite(seconds) and seconds > 0.0):
         raise WrongUse(f"a budget of {seconds:g} s cannot be kept; give a number above zero")

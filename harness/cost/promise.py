@@ -57,15 +57,11 @@ class _Record:
 
 
 def doubt(point: Point, radius: float, name: str | None) -> float:
-    """How unsure an answer is to be taken for, in m: the geometric mean of its claim and its object's record.
+    """Return the uncertainty of an answer in m: the geometric mean of its claim and its object's record.
 
     An answer that claims little error of an object on which the setting errs much is not as sure as one of an
-    object on which it never did. Only the order of doubts counts, see ``promises``.
-
-    Args:
-        point: the setting.
-        radius: m, that the answer claims.
-        name: of the object; one that was not measured has the record of all.
+    object on which it never did. Only the order of doubts counts, see ``promises``. An object that was not
+    measured has the record of all.
     """
     return _Record.of(point.samples).doubt(radius, name)
 
@@ -88,9 +84,7 @@ def promises(point: Point, share: float = MET) -> tuple[FloatArray, FloatArray]:
     harm: among the sure. That an object's record is of the same runs costs some of the exchangeability: a
     measured run's is without itself, a new run's of one more.
 
-    Args:
-        point: the setting; runs whose answer was refused claim nothing and promise nothing.
-        share: of runs in which a promise is to be met.
+    Runs whose answer was refused claim nothing and promise nothing.
 
     Returns:
         ``(k,)`` m, ascending: doubts up to which groups go that are large enough for any promise;
@@ -112,16 +106,9 @@ def promises(point: Point, share: float = MET) -> tuple[FloatArray, FloatArray]:
 
 
 def promise(point: Point, radius: float, name: str | None, share: float = MET) -> float:
-    """Metres within which the truth lies, in ``share`` of runs, given the radius that the answer claims.
+    """Return the distance in m within which the truth lies, in ``share`` of runs, by the claimed radius in m.
 
-    Args:
-        point: the setting.
-        radius: m, claimed.
-        name: of the object.
-        share: of runs in which it is to be met.
-
-    Returns:
-        Infinity where too few runs were measured, or none of so much doubt.
+    Infinity if too few runs were measured, or none of so much doubt.
     """
     limits, promised = promises(point, share)
     group = int(np.searchsorted(limits, doubt(point, radius, name)))
@@ -139,13 +126,15 @@ def promise_share(point: Point, name: str | None, error: float) -> float:
 
 def smallest_promise(point: Point, name: str | None) -> float:
     """Return the smallest error in m that a setting promises to any of the runs like these, or infinity."""
-    limits, promised = promises(point)
-    groups = np.searchsorted(limits, doubts(point, like(point, name)))
-    return float(np.append(promised, np.inf)[groups].min()) if len(groups) else float("inf")
+    return float(_promised_to_like(point, name).min(initial=np.inf))
 
 
 def typical_promise(point: Point, name: str | None) -> float:
     """Metres promised to half of the runs like these, or infinity."""
+    found = _promised_to_like(point, name)
+    return float(np.median(found)) if len(found) else float("inf")
+
+
+def _promised_to_like(point: Point, name: str | None) -> FloatArray:
     limits, promised = promises(point)
-    groups = np.searchsorted(limits, doubts(point, like(point, name)))
-    return float(np.median(np.append(promised, np.inf)[groups])) if len(groups) else float("inf")
+    return np.append(promised, np.inf)[np.searchsorted(limits, doubts(point, like(point, name)))]

@@ -40,13 +40,7 @@ def code(module: str) -> dict[str, str]:
 
 
 def stale(curve: Curve, here: Mapping[str, str], now: Mapping[str, str]) -> tuple[str, ...]:
-    """Why a curve no longer says what an answer costs; empty where it does.
-
-    Args:
-        curve: as it was measured.
-        here: this machine.
-        now: this code.
-    """
+    """Return reasons why a curve does not hold for the machine ``here`` and the code ``now``."""
     reasons = [
         f"{name} was {curve.machine.get(name, 'not noted')}, is {here.get(name, 'not noted')}"
         for name in dict.fromkeys((*curve.machine, *here))

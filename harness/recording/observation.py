@@ -94,12 +94,7 @@ def _needed(record: StepRecord, name: str) -> Reading:
 
 
 def picture_left_out(step: int, why: object) -> str:
-    """For people: the gel's picture of a step, from 0, has no part in what is computed.
-
-    Args:
-        step: of the run.
-        why: the refusal.
-    """
+    """State for people that the picture of a step, counted from 0, is not used, and why."""
     return f"step {step + 1}: its picture is left out: {why}"
 
 
@@ -252,19 +247,16 @@ def _transfers(strikes: Sequence[Strike]) -> tuple[FloatArray, ComplexArray]:
     samples = round(_DURATION * rate)
     window = np.exp(-_DECAY * np.arange(samples) / rate)
     frequencies: FloatArray = np.arange(samples + 1) / (2 * samples) * rate
-    found = np.array([_transfer(strike, rate, window, frequencies) for strike in strikes])
-    heard = np.any(found != 0.0, axis=0)
-    return frequencies[heard], found[:, heard]
-
-
-def _transfer(strike: Strike, rate: float, window: FloatArray, frequencies: FloatArray) -> ComplexArray:
-    start = max(0, strike.onset - round(_BEFORE * rate))
-    pulse = start + round((_BEFORE + _PULSE) * rate)
-    force = np.where(np.arange(len(strike.force)) < pulse, strike.force, 0.0)
-    force, pressure = (signal[start : start + len(window)] for signal in (force, strike.pressure))
-    size = 2 * len(window)
-    driven, heard = (np.fft.rfft(signal * window[: len(signal)], size) for signal in (force, pressure))
-    strength = np.abs(driven)
-    excited = (strength > _FLOOR * strength.max()) & (frequencies > _LOWEST)
-    ratio: ComplexArray = np.where(excited, heard / np.where(excited, driven, 1.0), 0.0)
-    return np.asarray(ratio / max(float(np.linalg.norm(ratio)), _SILENT), np.complex128)
+    found = np.zeros((len(strikes), len(frequencies)), np.complex128)
+    for number, strike in enumerate(strikes):
+        start = max(0, strike.onset - round(_BEFORE * rate))
+        pulse = start + round((_BEFORE + _PULSE) * rate)
+        force = np.where(np.arange(len(strike.force)) < pulse, strike.force, 0.0)
+        parts = [signal[start : start + samples] for signal in (force, strike.pressure)]
+        driven, heard = (np.fft.rfft(part * window[: len(part)], 2 * samples) for part in parts)
+        strength = np.abs(driven)
+        excited = (strength > _FLOOR * strength.max()) & (frequencies > _LOWEST)
+        ratio: ComplexArray = np.where(excited, heard / np.where(excited, driven, 1.0), 0.0)
+        found[number] = ratio / max(float(np.linalg.norm(ratio)), _SILENT)
+    excited = np.any(found != 0.0, axis=0)
+    return frequencies[excited], found[:, excited]

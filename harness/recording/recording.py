@@ -177,14 +177,11 @@ def require_unused(folder: Path) -> None:
 
 
 def header_of(data: bytes, path: Path) -> RunHeader:
-    """What the bytes of a ``run.json`` say; ``RecordingDamaged`` naming the file where they are others."""
+    """Parse the bytes of a ``run.json``; ``RecordingDamaged`` names the file if they are damaged."""
     try:
-        return _checked(parse_strictly(data), path)
+        fields = parse_strictly(data)
     except (ValueError, RecursionError) as error:
         raise RecordingDamaged(f"{path} is not JSON as a run writes it; {_COPY}") from error
-
-
-def _checked(fields: Any, path: Path) -> RunHeader:
     schema = fields.get("schema") if isinstance(fields, dict) else None
     if schema not in _READABLE or isinstance(schema, bool):
         raise RecordingDamaged(f"{path}: schema {schema!r}; this version reads {_UNSUMMED} to {SCHEMA}")

@@ -98,21 +98,10 @@ def create_run(
     mock: Mapping[str, Any] | None,
     acquisition: AcquisitionCalibration | None = None,
 ) -> Recording:
-    """Create a run folder with everything that an estimate needs.
+    """Create a run folder with everything that an estimate needs; see ``RunHeader``.
 
-    One process creates it; another process with the same folder is refused and removes nothing.
-
-    Args:
-        folder: of the run.
-        experiment: its name on the command line.
-        scene: resolved.
-        station: resolved.
-        mesh: of the object as the estimator is to know it, in metres.
-        calibration: of the gel, as the estimator is to know it.
-        plan: of the experiment, JSON values.
-        seed: of everything random.
-        mock: how the mocked bench is started; None at a real one.
-        acquisition: of the hammer's box; None for a run without sound.
+    One process creates it; another process with the same folder is refused and removes nothing. Mesh and
+    calibration are those that the estimator is to know; ``acquisition`` is None for a run without sound.
 
     Raises:
         WrongUse: the folder holds a run or is being written to, or files there have the names that a run

@@ -36,7 +36,7 @@ class Progress(Protocol):
 
 
 class Quiet:
-    """A progress that says nothing."""
+    """A progress that reports nothing."""
 
     def began(self, step: Step) -> None:
         """Nothing."""

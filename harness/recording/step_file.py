@@ -57,10 +57,7 @@ class StepRecord:
 def write_step(path: Path, record: StepRecord, clock_offset_ns: int) -> None:
     """Write beside ``path``, flush to the disk, then rename: a crash leaves the whole file or none.
 
-    Args:
-        path: of the file.
-        record: readings of the step, on the bench clock of its session.
-        clock_offset_ns: wall clock minus bench clock of that session; the file keeps it.
+    The file keeps the clock offset, wall clock minus bench clock of the session.
     """
     stream = BytesIO()
     # JPEG does not compress again; the numbers are few.
@@ -68,11 +65,7 @@ def write_step(path: Path, record: StepRecord, clock_offset_ns: int) -> None:
     writer.start(profile="", library=UNSUMMED_LIBRARY)
     for reading in record.readings.values():
         _write_reading(writer, reading, clock_offset_ns)
-    described = {
-        "step": asdict(record.step),
-        "seconds": record.seconds,
-        "clock_offset_ns": clock_offset_ns,
-    }
+    described = {"step": asdict(record.step), "seconds": record.seconds, "clock_offset_ns": clock_offset_ns}
     writer.add_metadata("touchstone.step", {"json": json.dumps(described, allow_nan=False)})
     writer.finish()  # type: ignore[no-untyped-call]  # mcap leaves it unannotated
     data = stream.getvalue()
@@ -101,12 +94,10 @@ def _write_reading(writer: Writer, reading: Reading, clock_offset_ns: int) -> No
 
 
 def read_step(path: Path, clock_offset_ns: int, summed: bool = True) -> StepRecord:
-    """The step of a file.
+    """Read the step of a file.
 
-    Args:
-        path: of the file.
-        clock_offset_ns: wall clock minus bench clock, for files that do not keep that of their session.
-        summed: whether the file must carry a checksum; only runs of schema 1 hold files without.
+    ``clock_offset_ns``, wall clock minus bench clock, is for files that do not keep that of their session.
+    Only files of runs of schema 1 need no checksum.
 
     Raises:
         RecordingDamaged: missing, or other bytes than were written; the file is named.
@@ -140,10 +131,6 @@ def _require_intact(data: bytes, path: Path, summed: bool) -> None:
 
 def read_wall_span(path: Path, summed: bool = True) -> tuple[int, int] | None:
     """Read a step's first and last time stamp, in ns of the wall clock; None for a step without readings.
-
-    Args:
-        path: of the file.
-        summed: whether the file must carry a checksum.
 
     Raises:
         RecordingDamaged: missing, or other bytes than were written.

@@ -154,7 +154,7 @@ class Studio:
 
 
 def measured(asked: Sequence[Way], studio: Studio, repeat: int, report: Report) -> tuple[PictureCost, ...]:
-    """Measure errors and seconds of each way, whose networks the studio has; pictures are timed repeatedly."""
+    """Measure errors and seconds of each way, whose networks the studio has."""
     worth = []
     for number, way in enumerate(asked):
         report("comparing pictures", 0.5 * number / len(asked))
