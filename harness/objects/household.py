@@ -25,21 +25,13 @@ _STEPS_ROUND = 4
 
 @lru_cache(maxsize=64)
 def build(name: str, edge: float = 3e-3) -> Mesh:
-    """Build one of our own objects, in metres; a mesh built before is returned again.
+    """Build a household object in metres, watertight; see ``harness.objects.builtin.build``.
 
-    The shape does not depend on ``edge`` beyond the flat faces' distance from the curve
-    they stand for; no two values of it share vertices.
+    A mesh that was built before is returned again.
 
-    Args:
-        name: a key of ``MATERIALS``.
-        edge: metres between neighbouring vertices where the surface is curved (across a
-            quadrangle half as much again); 0.3 to 10 mm.
-
-    Returns:
-        A watertight mesh, outward, standing on z = 0 about the z axis.
-
-    Raises:
-        WrongUse: no such object, or an edge out of range.
+    The shape does not depend on ``edge``, the distance of neighbouring vertices where the surface is curved
+    (across a quadrangle half as much again), beyond the flat faces' distance from the curve that they
+    approximate; no two values of it share vertices.
     """
     if name not in _BUILDERS:
         raise WrongUse(f"no built-in object {name!r}; there are {', '.join(_BUILDERS)}")
@@ -306,15 +298,14 @@ def slab(area: CrossSection, thickness: float, rounding: float, edge: float) -> 
     loops = [walked(np.asarray(contour), edge, closed=True) for contour in area.to_polygons()]
     normals = [_outward_normals(loop) for loop in loops]
     sizes = [len(loop) for loop in loops]
-    total = sum(sizes)
+    total, starts = sum(sizes), np.cumsum([0, *sizes[:-1]]).tolist()
+    runs = list(zip(starts, sizes, strict=True))
     layers = [
         np.column_stack([np.vstack(loops) - inset * np.vstack(normals), np.full(total, height)])
         for inset, height in zip(insets, heights, strict=True)
     ]
-    cap = _cap([layers[0][start : start + size, :2] for start, size in _runs(sizes)])
-    sides = [
-        _strip(start + k * total, size, total) for start, size in _runs(sizes) for k in range(len(layers) - 1)
-    ]
+    cap = np.asarray(triangulate([layers[0][start : start + size, :2] for start, size in runs]), np.int64)
+    sides = [_strip(start + k * total, size, total) for start, size in runs for k in range(len(layers) - 1)]
     faces = np.vstack([cap[:, ::-1], cap + total * (len(layers) - 1), *sides])
     return outward(Mesh(np.vstack(layers), faces))
 
@@ -324,14 +315,6 @@ def _outward_normals(loop: FloatArray) -> FloatArray:
     tangent = np.roll(loop, -1, axis=0) - np.roll(loop, 1, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1)[:, None]
     return np.column_stack([tangent[:, 1], -tangent[:, 0]])
-
-
-def _runs(sizes: list[int]) -> list[tuple[int, int]]:
-    return list(zip(np.cumsum([0, *sizes[:-1]]).tolist(), sizes, strict=True))
-
-
-def _cap(loops: list[FloatArray]) -> IntArray:
-    return np.asarray(triangulate(loops), dtype=np.int64)
 
 
 def _strip(start: int, size: int, stride: int) -> IntArray:

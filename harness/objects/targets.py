@@ -22,16 +22,10 @@ _FINER = 1.0 / 40.0
 
 
 def ball(edge: float = 3e-3) -> Mesh:
-    """A ball of radius ``BALL_RADIUS`` on a stem, standing on z = 0 about the z axis, in metres.
+    """Build a ball of radius ``BALL_RADIUS`` on a stem, standing on z = 0 about the z axis, in metres.
 
-    The ball's top is ``_HEIGHT`` radii above the foot. At the usual edge the facets stay within a
-    micrometre of the sphere.
-
-    Args:
-        edge: metres, as ``harness.objects.household.build`` takes it; a fortieth of it is taken.
-
-    Returns:
-        A watertight mesh, outward.
+    The ball's top is ``_HEIGHT`` radii above the foot. At the usual edge, of which a fortieth is taken, the
+    facets stay within a micrometre of the sphere. The mesh is watertight.
     """
     fine = edge * _FINER
     centre = (_HEIGHT - 1.0) * BALL_RADIUS

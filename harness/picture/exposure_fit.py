@@ -12,7 +12,6 @@ import numpy as np
 from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.files.named_file import nearest
-from harness.picture.robust_fit import TUKEY, robust_fit, scatter
 from harness.picture.srgb import LINEAR_OF_BYTE
 
 BLOCK = 16
@@ -48,12 +47,7 @@ class Together:
 
 
 def together(where: BoolArray, light: FloatArray) -> Together:
-    """The groups of pixels.
-
-    Args:
-        where: ``(rows, columns)`` pixels that count.
-        light: ``(n, 3)`` simulated light of these, by whose mean over colours they are shaded.
-    """
+    """Group the pixels that count by blocks and by the mean over colours of their ``(n, 3)`` light."""
     rows, columns = np.nonzero(where)
     block = _counted(rows // BLOCK * (where.shape[1] // BLOCK + 1) + columns // BLOCK)
     grey = light.mean(axis=1)
@@ -79,12 +73,7 @@ def group_variance(moved: FloatArray, groups: Together) -> FloatArray:
 
     Of blocks, and of shades, less what both count: a group. It is never less than that of blocks alone.
 
-    Args:
-        moved: ``(groups, ...)`` how far each group moves each value.
-        groups: of two blocks or more.
-
-    Returns:
-        ``(...)`` the square of the values' unit.
+    ``(groups, ...)`` states how far each group, of two blocks or more, moves each value.
     """
     by_block = _squares(moved, groups.block, 1)
     if int(groups.shade.max()) + 1 < _FEWEST:
@@ -124,6 +113,87 @@ def mistaken_light(left: FloatArray, measured: BoolArray, reach: float) -> float
     found = np.concatenate([each[np.isfinite(each)] for each in bent])
     noise = _NORMAL * float(np.median(np.abs(found))) if found.size else 0.0
     return max(0.0, float(np.mean(held**2)) - noise**2 / _SECOND_DIFFERENCE)
+
+
+TUKEY = 4.685
+"""Robust standard deviations beyond which a point says nothing: 95 % efficient where errors are normal."""
+
+_STARTS = 30
+_ROUNDS = 300
+_SETTLED = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class RobustFit:
+    """Values of a linear model."""
+
+    values: FloatArray  #: ``(values,)``.
+    moved: FloatArray
+    """``(blocks, values)`` how far each block's points pull the values; the root of the sum of their squares
+    is the standard error, but for ``blocks / (blocks - 1)`` under the root."""
+    scale: float  #: robust standard deviation of what is left.
+    outliers: float  #: share of the points that have no weight.
+
+    def __post_init__(self) -> None:
+        read_only(self.values)
+        read_only(self.moved)
+
+
+def scatter(left: FloatArray) -> float:
+    """Compute the robust standard deviation of residuals by the median of their size."""
+    return float(_NORMAL * np.median(np.abs(left)))
+
+
+def robust_fit(
+    design: FloatArray, wanted: FloatArray, blocks: AnyArray, count: int, floor: float
+) -> RobustFit | None:
+    """Fit values such that ``design @ values`` is ``wanted``, without regard to outliers.
+
+    Least absolute deviations begin, Tukey's bisquare ends (Huber and Ronchetti, Robust Statistics, 2009,
+    chapters 4 and 7). Standard errors are by blocks of points, which may disagree for any reason (Liang and
+    Zeger, 1986, with blocks as clusters).
+
+    Args:
+        design: ``(n, values)`` of full rank, finite.
+        wanted: ``(n,)`` finite.
+        blocks: ``(n,)`` integers, the block of each point, 0 to ``count - 1``.
+        count: of blocks; two or more.
+        floor: least scale, as of rounding; greater than zero.
+
+    Returns:
+        None where no values hold most points together, or none settle to 1e-7.
+    """
+    # Least absolute deviations, to a few parts of the scatter, where the bisquare takes over.
+    start = _weighted(design, wanted, np.ones(wanted.size))
+    for _ in range(_STARTS):
+        left = np.abs(wanted - design @ start)
+        start = _weighted(design, wanted, 1.0 / np.maximum(left, 0.1 * floor))
+    # The scale is that of the start and stays: it would else creep up with every outlier that is let in.
+    scale = max(scatter(wanted - design @ start), floor)
+    values = start
+    for _ in range(_ROUNDS):
+        u = (wanted - design @ values) / (TUKEY * scale)
+        weights = np.where(np.abs(u) < 1.0, (1.0 - u**2) ** 2, 0.0)
+        before, values = values, _weighted(design, wanted, weights)
+        if np.abs(values - before).max() <= _SETTLED:
+            break
+    else:
+        return None
+    u = (wanted - design @ values) / (TUKEY * scale)
+    inside = np.abs(u) < 1.0
+    slope = np.where(inside, (1.0 - u**2) * (1.0 - 5.0 * u**2), 0.0)
+    bread = (design * slope[:, None]).T @ design
+    if np.linalg.eigvalsh(bread)[0] <= 0.0:
+        return None
+    pull = np.where(inside, TUKEY * scale * u * (1.0 - u**2) ** 2, 0.0)[:, None] * design
+    pulls = np.column_stack([np.bincount(blocks, column, count) for column in pull.T])
+    moved: FloatArray = np.asarray(np.linalg.solve(bread, pulls.T).T, np.float64)
+    return RobustFit(values, moved, scale, float(np.mean(~inside)))
+
+
+def _weighted(design: FloatArray, wanted: FloatArray, weights: FloatArray) -> FloatArray:
+    heavy = design * weights[:, None]
+    return np.asarray(np.linalg.lstsq(heavy.T @ design, heavy.T @ wanted, rcond=None)[0])
 
 
 ExposureKind = Literal["gain-offset", "gain", "none"]
@@ -202,11 +272,7 @@ class _Channel:
 
 
 def exposure_kind(text: str) -> ExposureKind:
-    """What is to be fitted.
-
-    Raises:
-        WrongUse: no such thing.
-    """
+    """Return the kind of that name; ``WrongUse`` if there is none."""
     for kind in KINDS:
         if text == kind:
             return kind

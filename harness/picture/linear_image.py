@@ -59,15 +59,7 @@ class LinearImage:
 
 
 def binned(image: LinearImage, by: int) -> LinearImage:
-    """The picture in pixels ``by`` times as large, each the mean of those that it is made of.
-
-    Args:
-        image: both sides a multiple of ``by``.
-        by: pixels along the new one, one or more.
-
-    Raises:
-        OutOfDomain: sides that are no multiple.
-    """
+    """Merge ``by`` x ``by`` pixels to one, their mean; ``OutOfDomain`` if a side is no multiple."""
     rows, columns = image.alpha.shape
     if by < 1 or rows % by or columns % by:
         raise OutOfDomain(f"a picture of {rows} x {columns} pixels is no whole number of {by} x {by}")
@@ -77,14 +69,3 @@ def binned(image: LinearImage, by: int) -> LinearImage:
     depth = np.divide(seen, alpha, out=np.full_like(alpha, np.inf), where=alpha > 0.0)
     colour = block_means(image.colour, by)
     return LinearImage(colour, alpha, depth)
-
-
-def root_mean_square(a: LinearImage, b: LinearImage) -> float:
-    """How far two pictures are apart: linear light, root of the mean square over pixels and channels.
-
-    Raises:
-        OutOfDomain: they differ in size.
-    """
-    if a.colour.shape != b.colour.shape:
-        raise OutOfDomain(f"pictures of {a.colour.shape} and {b.colour.shape} pixels cannot be compared")
-    return float(np.sqrt(np.mean((a.colour - b.colour) ** 2)))

@@ -196,11 +196,7 @@ class DirectionalLight:
 
 
 def unit_vector(vector: Vector, meaning: str) -> FloatArray:
-    """``(3,)`` the same direction of length 1.
-
-    Args:
-        vector: ``(3,)`` of any length but zero.
-        meaning: what it is, for the message.
+    """Divide ``(3,)`` by its length; ``meaning`` names it in messages.
 
     Raises:
         OutOfDomain: not three finite numbers, or no length.

@@ -23,12 +23,9 @@ MADE_SQUARE = "made square by"
 
 
 def aspect_stated(made_from: str) -> float:
-    """A pixel's height over its width by which a calibration's presses were made square; 1 where they were.
+    """Read a pixel's height over its width from ``made_from`` of a calibration's header; 1 if it states none.
 
-    Live pictures of that sensor are made square by it before anything else looks at them.
-
-    Args:
-        made_from: of the calibration's header.
+    Live pictures of that sensor are made square by it before anything else.
 
     Raises:
         OutOfDomain: an aspect that is none of a camera.

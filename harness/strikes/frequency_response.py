@@ -153,7 +153,12 @@ def frequency_response(
     _check(blows, heard)
     samples = driven.shape[1]
     window = np.exp(-decay * np.arange(samples) / rate)
-    force = rfft(np.array([_windowed(f, b, rate) for f, b in zip(driven, blows, strict=True)]) * window)
+    times, contacts = np.arange(samples) / rate, np.zeros_like(driven)
+    for contact, blow, samples_ in zip(contacts, blows, driven, strict=True):
+        # The force about its contact, above its rest.
+        touching = (times >= blow.start - _AROUND) & (times <= blow.start + blow.duration + _AROUND)
+        contact[touching] = samples_[touching] - blow.rest
+    force = rfft(contacts * window)
     response = rfft(heard * window)
     drive, answer = np.sum(np.abs(force) ** 2, axis=0), np.sum(np.abs(response) ** 2, axis=0)
     cross = np.sum(response * force.conj(), axis=0)
@@ -301,13 +306,6 @@ def _find_cause(
     if not 1.0 / _GAIN < abs(gain) < _GAIN:
         causes.append(f"is {abs(gain):.2g} times as large")
     return " and ".join(causes)
-
-
-def _windowed(force: FloatArray, blow: Blow, rate: float) -> FloatArray:
-    """The force about its contact, above its rest."""
-    times = np.arange(len(force)) / rate
-    touching = (times >= blow.start - _AROUND) & (times <= blow.start + blow.duration + _AROUND)
-    return np.where(touching, force - blow.rest, 0.0)
 
 
 def _ratio(above: AnyArray, below: AnyArray) -> ComplexArray:

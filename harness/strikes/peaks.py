@@ -57,11 +57,9 @@ class SoundEvidence:
 
 
 def analyse(strikes: Sequence[Strike], settings: Analysis | None = None) -> SoundEvidence:
-    """The resonances that the strikes have in common, and each strike's share of every one.
+    """Find the resonances that strikes of one object have in common, and each strike's share of every one.
 
-    Args:
-        strikes: of one object at rest, heard by one microphone at rest.
-        settings: how they are read.
+    Object and microphone are at rest.
 
     Returns:
         No peaks where fewer than two strikes count: one alone cannot be told from the microphone's

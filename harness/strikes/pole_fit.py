@@ -82,13 +82,9 @@ class PoleFit:
 
 
 def fit_poles(lines: SpectralLines, omegas: FloatArray, decays: FloatArray, skirt: int) -> PoleFit:
-    """Refine poles until the lines are fitted best.
+    """Refine ``(m,)`` poles in rad/s and 1/s until the lines, no fewer than the unknowns, are fitted best.
 
-    Args:
-        lines: at least as many as there are unknowns.
-        omegas: ``(m,)`` rad/s, where to start.
-        decays: ``(m,)`` 1/s.
-        skirt: terms of the polynomial.
+    ``skirt`` is the number of terms of the polynomial.
     """
     problem = _Problem(lines, omegas, skirt)
     if len(omegas) == 0:
@@ -257,13 +253,9 @@ class PoleSearch:
 def new_poles(
     lines: SpectralLines, fit: PoleFit, search: PoleSearch, rounding: float
 ) -> list[tuple[float, float]]:
-    """Where the residual stands out, strongest first: ``w`` in rad/s and ``d`` in 1/s to start a fit from.
+    """Find peaks of the residual, strongest first: ``w`` in rad/s and ``d`` in 1/s to start a fit from.
 
-    Args:
-        lines: that were fitted.
-        fit: of the poles known so far.
-        search: what counts as standing out.
-        rounding: of the strongest line of a channel, below which everything is arithmetic.
+    Below ``rounding`` of the strongest line of a channel everything is arithmetic.
     """
     power = np.abs(fit.residual) ** 2
     reach = min(2 * search.floor_reach + 1, power.shape[1])
@@ -287,7 +279,7 @@ def new_poles(
 def _spread_out(
     lines: SpectralLines, fit: PoleFit, power: FloatArray, tops: AnyArray
 ) -> list[tuple[float, float]]:
-    """Those peaks that no stronger one can have caused: its skirt, or the other side of a misfit mode."""
+    """Keep the peaks that no stronger one can have caused: its skirt, or the other side of a misfit mode."""
     chosen: list[tuple[float, float]] = []
     reach: list[tuple[float, float]] = []
     known, widths = fit.omegas / (2.0 * np.pi), fit.decays / (2.0 * np.pi)

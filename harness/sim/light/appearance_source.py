@@ -21,8 +21,8 @@ from harness.basics.files.named_file import require_file
 from harness.basics.geometry import rotate_upright
 from harness.basics.mesh import Mesh
 from harness.objects.builtin import BUILTIN, MATERIALS, build
+from harness.picture.image_file import decode_texture
 from harness.picture.srgb import PEAK, bytes_from_linear, linear_from_srgb
-from harness.picture.texture import decode_texture
 from harness.sim.light.appearance import CREASE, NO_TEXTURE, Appearance, smooth_normals
 from harness.sim.solid.coordinates import move_near
 from harness.sim.solid.formats.obj_colours import read_obj_colours

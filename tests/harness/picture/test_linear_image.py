@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.basics.errors import OutOfDomain
-from harness.picture.linear_image import LinearImage, binned, root_mean_square
+from harness.picture.linear_image import LinearImage, binned
 from harness.picture.srgb import LINEAR_OF_BYTE, bytes_from_linear, linear_from_srgb, srgb_from_linear
 
 
@@ -59,16 +59,9 @@ def test_an_exposure_that_is_none_is_refused(exposure: float) -> None:
         picture(1.0).display(exposure=exposure)
 
 
-def test_distance_of_pictures_is_in_light() -> None:
-    assert root_mean_square(picture(1.0, 0.5), picture(1.0, 0.75)) == pytest.approx(0.25)
-
-
 def test_pictures_of_other_shapes_are_refused() -> None:
     with pytest.raises(OutOfDomain, match="rows, columns"):
         LinearImage(np.zeros((3, 4, 3)), np.zeros((3, 5)), np.zeros((3, 5)))
-    other = LinearImage(np.zeros((2, 2, 3)), np.zeros((2, 2)), np.zeros((2, 2)))
-    with pytest.raises(OutOfDomain, match=r"\(2, 2"):
-        root_mean_square(picture(1.0), other)
 
 
 def test_larger_pixels_hold_the_same_light_and_the_depth_of_what_they_show() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.picture.robust_fit import robust_fit, scatter
+from harness.picture.exposure_fit import robust_fit, scatter
 
 RANDOM = np.random.default_rng(0)
 X = RANDOM.uniform(0.0, 1.0, 600)

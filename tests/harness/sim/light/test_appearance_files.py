@@ -13,8 +13,8 @@ from PIL import Image
 
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import MeshRefused
+from harness.picture.image_file import decode_texture
 from harness.picture.srgb import LINEAR_OF_BYTE, linear_from_srgb
-from harness.picture.texture import decode_texture
 from harness.sim.light.appearance import Appearance
 from harness.sim.light.appearance_source import read_appearance
 from tests.support.made_meshes import CORNERS, FACES, add_accessor, box_tree, write_glb
