@@ -25,14 +25,7 @@ from harness.basics.mesh import Mesh
 def is_within(
     rays: RayMesh, points: FloatArray, face_normals: FloatArray, random: np.random.Generator
 ) -> BoolArray:
-    """``(n,)``: whether a ray from each ``(n, 3)`` place leaves the surface where it first meets it.
-
-    Args:
-        rays: of a closed surface.
-        points: m.
-        face_normals: ``(f, 3)`` outward, of the surface.
-        random: draws a direction for each place.
-    """
+    """Mark which ``(n, 3)`` places in m a closed surface encloses: by where a random ray first meets it."""
     directions = sphere(len(points), random)
     hits = rays.first_hits(points, directions)
     found = np.zeros(len(points), np.bool_)
@@ -74,7 +67,7 @@ class HexahedralModes:
 
 
 def voxel_cubes(mesh: Mesh, cells: int = CELLS) -> tuple[IntArray, FloatArray, float]:
-    """The cubes whose middles an object encloses.
+    """Find the cubes whose centres an object encloses.
 
     Returns:
         ``(c, 3)`` their indices, ``(3,)`` m where index 0 begins, and m, a side.
@@ -97,14 +90,7 @@ def voxel_cubes(mesh: Mesh, cells: int = CELLS) -> tuple[IntArray, FloatArray, f
 def hexahedral_modes(
     mesh: Mesh, material: Material, limit: float, most: int, cells: int = CELLS
 ) -> HexahedralModes:
-    """The modes of an object made of cubes.
-
-    Args:
-        mesh: closed, in metres.
-        material: of all of it.
-        limit: Hz, above zero.
-        most: modes at most, the lowest.
-        cells: cubes along the longest side.
+    """Compute the ``most`` lowest modes up to ``limit`` Hz of an object made of cubes.
 
     Raises:
         MeshRefused: a surface that holds no cube, or cubes without a mode below the limit.
@@ -135,12 +121,7 @@ def hexahedral_modes(
 
 
 def cube_matrices(material: Material, side: float) -> tuple[FloatArray, FloatArray]:
-    """``(24, 24)`` stiffness in N/m and consistent mass in kg of one cube, nodes in binary order.
-
-    Args:
-        material: isotropic.
-        side: m.
-    """
+    """Compute ``(24, 24)`` stiffness in N/m and consistent mass in kg of a cube, nodes in binary order."""
     # Hooke's law in Pa.
     poisson = material.poisson
     first = material.young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))

@@ -96,12 +96,12 @@ class ViewBench:
 
 
 def shown(image: LinearImage) -> ByteArray:
-    """``(rows, columns, 3)`` before white, in sRGB."""
+    """Return ``(rows, columns, 3)`` before white, in sRGB."""
     return image.display(BEHIND)
 
 
 def view_bench(of: ObjectFile, views: int, work: RenderingWork) -> ViewBench:
-    """The views of an object.
+    """Render the views of an object and their reference.
 
     Raises:
         DataRefused: its colours come from a file, which an ObjectFile does not hold.
@@ -223,12 +223,12 @@ def render_ball(
 
 
 def ball_of(mesh: Mesh) -> tuple[FloatArray, float]:
-    """``(3,)`` m and m: middle and radius of the ball around an object's box."""
+    """Return the ``(3,)`` centre and the radius of the ball around an object's box, m."""
     return mesh.bounds.mean(axis=0), 0.5 * mesh.diagonal
 
 
 def opened_field(data: bytes, mesh: Mesh, samples: int) -> UniformField:
-    """The network of a graph, ready for pictures of an object."""
+    """Open the network of a graph for pictures of an object."""
     inputs, outputs = osf_tensors(REACH)
     return UniformField(osf_field(Network(data, FIELD_FILE, inputs, outputs)), *ball_of(mesh), samples)
 
@@ -243,13 +243,7 @@ _SETTINGS: tuple[tuple[str, Column, RenderSettings], ...] = (
 
 
 def look_methods(bench: ViewBench, of: ObjectFile, work: RenderingWork) -> list[RenderingMethod]:
-    """Every row of vision.
-
-    Args:
-        bench: of the views.
-        of: the object; its own networks are rows where it has some.
-        work: where networks are stored.
-    """
+    """Return every row of vision; the networks of the object are rows if it has some."""
     white = MadeMethod(lambda _: np.full((SIZE, SIZE, 3), 255, np.uint8))
     entry = of.description.vision
     own = (

@@ -137,14 +137,7 @@ def train_network(
 ) -> tuple[bytes, float]:
     """Train a network by ``rendering_training.train_NAME``; see ``stored_graph``.
 
-    Args:
-        work: has the store, and takes progress.
-        name: name of the network.
-        what: its name in messages.
-        bench: the queries that it must not learn from.
-        spec: its layers and their training.
-        lesson: digest of all that it learns from.
-        settings: what else it depends on.
+    It must not learn from the queries of the bench; ``lesson`` is a digest of all that it learns from.
     """
 
     def train() -> bytes:
@@ -159,17 +152,10 @@ def train_network(
 def stored_graph(
     store: Store, identity: tuple[object, ...], what: str, train: Callable[[], bytes], torch: bool = True
 ) -> tuple[bytes, float]:
-    """The graph of a network from the store, or trained now and put there.
+    """Take the graph of a network from the store, or train it and put it there.
 
-    Args:
-        store: of graphs.
-        identity: of all that the network depends on.
-        what: the network is called in messages.
-        train: gives the graph's bytes.
-        torch: whether training needs it.
-
-    Returns:
-        The bytes, and the CPU s that training took, then or now.
+    ``identity`` holds all that the network depends on, ``what`` names it in messages, and ``torch`` states
+    whether training needs it. The CPU seconds of the training are returned too.
 
     Raises:
         TorchMissing: it has to be trained and cannot be.
@@ -213,15 +199,10 @@ class MeasuredMethod:
 def measure_sense(
     bench: RenderingBench, methods: Sequence[RenderingMethod], work: RenderingWork
 ) -> Iterator[MeasuredMethod]:
-    """Every method of a sense, each cell stored as soon as it is measured.
+    """Measure every method of a sense, each cell stored as soon as it is measured; names must differ.
 
     Quality is a cell a method. Seconds are one cell of all methods, which render in turn, so that what else
     the machine does meets them alike.
-
-    Args:
-        bench: of the sense.
-        methods: with names that differ.
-        work: where cells are stored.
     """
     worth: dict[str, Mapping[str, FloatArray]] = {}
     missing: dict[str, str] = {}
@@ -276,13 +257,7 @@ def _quality(
 
 
 def timed_in_turn(made: Mapping[str, MadeMethod], count: int, rounds: int = ROUNDS) -> dict[str, FloatArray]:
-    """``(k,)`` CPU s of each: in every round each renders one query, and a slow one in fewer rounds.
-
-    Args:
-        made: by name.
-        count: of queries; rounds take them one after the other.
-        rounds: at most.
-    """
+    """Measure ``(k,)`` CPU s of each: in every round each renders one query, a slow one in fewer rounds."""
     taken: dict[str, list[float]] = {name: [] for name in made}
     for name, method in made.items():
         first = _seconds(method, 0)

@@ -34,7 +34,7 @@ from harness.commands.output import ANSWERS
 from harness.cost.provenance import machine
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.touch.nodes import NodeSearch
-from harness.objectfile.touch.touch import CodeMaps, open_touch
+from harness.objectfile.touch.touch import nodes_of
 
 QUOTED_SECONDS: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType({
     "ObjectFolder 1.0": {"vision": 3.699, "audio": 0.420, "touch": 0.010},
@@ -141,9 +141,7 @@ def _measured(
             codes: NodeSearch | None = None
             entry = of.description.touch
             if entry is not None and entry.codes is not None:
-                maps = open_touch(of, "codes").maps
-                assert isinstance(maps, CodeMaps)
-                codes = maps.nodes
+                codes = NodeSearch(nodes_of(of, entry.codes), entry.codes.most_off_m)
             presses = touch_bench(mesh, counts.presses, "any", work, codes)
             yield presses, touch_methods(presses, of, work)
             upright = touch_bench(mesh, counts.presses, "upright", work, codes)
@@ -151,7 +149,7 @@ def _measured(
 
 
 def row_of(name: str, queries: int, sense: Sense, found: MeasuredMethod) -> RenderingRow:
-    """The row of a measured method; without numbers where it could not be made."""
+    """Create the row of a measured method; without numbers if it could not be made."""
     method = found.method
     seconds = None
     if len(found.seconds):
@@ -166,7 +164,7 @@ def row_of(name: str, queries: int, sense: Sense, found: MeasuredMethod) -> Rend
 
 
 def machine_text() -> str:
-    """The processor that seconds were taken on, and how many cores of it there are."""
+    """Name the processor that seconds were taken on, and its number of cores."""
     known = machine()
     return f"{known['cpu']}, {known['cores']} virtual cores, one thread"
 
@@ -206,12 +204,7 @@ _MILLI = 1e3
 
 
 def print_tables(rows: Sequence[RenderingRow], machine: str) -> None:
-    """Tables 1 and 2 of each object, then all rows of each sense.
-
-    Args:
-        rows: quoted and measured ones.
-        machine: that the measured seconds are of.
-    """
+    """Print tables 1 and 2 of each object, then all rows of each sense; ``machine`` measured the seconds."""
     quoted = [row for row in rows if row.object == QUOTED]
     for name in dict.fromkeys(row.object for row in rows if row.object != QUOTED):
         own = [row for row in rows if row.object == name]

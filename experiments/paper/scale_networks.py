@@ -66,12 +66,7 @@ SIZE_INPUTS: Mapping[str, tuple[tuple[str, tuple[int, ...]], ...]] = {
 
 
 def crop_of(picture: ByteArray, mask: BoolArray, focal_px: float) -> FloatArray:
-    """The picture about the object, what is behind it made black.
-
-    Args:
-        picture: ``(rows, columns, 3)`` RGB.
-        mask: ``(rows, columns)`` the object's pixels.
-        focal_px: pixels of the camera's focal length: how large an angle a pixel is. Its pose is not used.
+    """Cut the object out of an RGB picture, with a black background; the camera's pose is not used.
 
     Returns:
         ``(3, SIDE, SIDE)``, 0 black to 1 white, times the share of a pixel that the object covers.
@@ -157,10 +152,7 @@ class PaperNetwork:
     network: Network  #: that runs it.
 
     def size(self, views: Sequence[Mapping[str, FloatArray]]) -> float:
-        """M: the geometric mean of the sizes of one or more readings of one object.
-
-        Args:
-            views: the inputs of each, by name.
+        """Compute the geometric mean, in m, of the sizes by the inputs of one or more readings of one object.
 
         Raises:
             DataRefused: inputs of another form, or an answer that is no size.

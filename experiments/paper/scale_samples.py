@@ -61,10 +61,11 @@ def pictures(seed: int, count: int, number: int) -> list[SampleRow]:
 
 def single_strikes(seed: int, count: int, number: int) -> list[SampleRow]:
     """The spectrograms of strikes of so many draws of one shape; none where its modes cannot be solved."""
-    shape = ringing_of(number, seed)
-    random, rows = np.random.default_rng((seed, number, _STREAMS["spectrogram"])), []
-    for _ in range(count if shape is not None else 0):
-        assert shape is not None
+    shape, rows = ringing_of(number, seed), list[SampleRow]()
+    if shape is None:
+        return rows
+    random = np.random.default_rng((seed, number, _STREAMS["spectrogram"]))
+    for _ in range(count):
         size, material = draw_size(random), str(random.choice(list(MATERIALS)))
         responses, band = strike_responses(shape, size, material, random)
         for response in responses:
@@ -121,14 +122,7 @@ def _crop(lit: LitObject, mesh: Mesh, size: float, random: np.random.Generator) 
 def crop_camera(
     mesh: Mesh, size: float, base_from_object: FloatArray, base_from_camera: FloatArray
 ) -> Pinhole:
-    """A camera of the bench, cut to a crop about the object, in the frame of its shape.
-
-    Args:
-        mesh: of the shape, one long.
-        size: m, of the object.
-        base_from_object: ``(4, 4)``, where it stands.
-        base_from_camera: ``(4, 4)``; x right, y down, z forward.
-    """
+    """Return a camera of the bench, cut to a crop about the object, in the frame of its shape, one long."""
     object_from_camera = inverse(base_from_object) @ base_from_camera
     object_from_camera[:3, 3] /= size
     corners = apply(inverse(object_from_camera), mesh.vertices)

@@ -191,18 +191,18 @@ _TURNS = 8
 
 
 def random_error(sizes: SizeRange, true: float) -> float:
-    """M, the mean error of a size drawn from the range, even in its logarithm."""
+    """Return the mean error in m of a size sampled from the range, uniform in its logarithm."""
     inside = np.exp(sizes.logs[sizes.inside.astype(bool)])
     return float(np.abs(inside - true).mean())
 
 
 def constant(sizes: SizeRange) -> float:
-    """M, the middle of the range."""
+    """Return the geometric mean of the range, m."""
     return float(np.sqrt(sizes.low * sizes.high))
 
 
 def by_first_peak(peaks: Peaks, model: RingingModel, nominal: float) -> float:
-    """M, were the lowest peak the lowest mode."""
+    """Return the size in m if the lowest peak were the lowest mode."""
     return float(nominal * model.frequencies[0] / peaks.frequencies[0])
 
 

@@ -198,28 +198,21 @@ class PlacedShape:
 def fit_pose(
     shape: LibraryShape, samples: ContactSamples, evidence: ShapeEvidence, silhouette: Silhouette | None
 ) -> PlacedShape:
-    """Fit the size, yaw and position of a shape.
-
-    Args:
-        shape: the shape.
-        samples: points of the contacts, one or more.
-        evidence: readings that state the free space.
-        silhouette: silhouette of the picture; None without one.
-    """
+    """Fit the size, yaw and position of a shape to one or more contacts, free space and silhouette."""
     few = samples.points[np.random.default_rng(0).permutation(len(samples.points))[:_RANKED_CONTACTS]]
     low, high = samples.points.min(axis=0), samples.points.max(axis=0)
     reach = max(float(np.max([*(high - low)[:2], high[2]])), _LEAST)
     middle = 0.5 * (low + high)[:2]
     yaws = np.arange(YAWS) * 2.0 * np.pi / YAWS
     starts = [PlacedShape(shape, size * reach, float(yaw), middle, np.inf) for size in SIZES for yaw in yaws]
-    starts.sort(key=lambda start: _distance_cost(start, few))
+
+    def distance_cost(at: PlacedShape) -> float:
+        apart = at.size * np.asarray(at.shape.samples[0].query(at.inward(few))[0])
+        return float(np.log1p((apart / SCALE) ** 2).mean())
+
+    starts.sort(key=distance_cost)
     refined = [_refine(start, samples) for start in starts[:REFINED]]
     return min((_with_cost(one, samples, evidence, silhouette) for one in refined), key=lambda one: one.cost)
-
-
-def _distance_cost(at: PlacedShape, points: FloatArray) -> float:
-    apart = at.size * np.asarray(at.shape.samples[0].query(at.inward(points))[0])
-    return float(np.log1p((apart / SCALE) ** 2).mean())
 
 
 def _refine(at: PlacedShape, samples: ContactSamples) -> PlacedShape:
@@ -308,10 +301,6 @@ class RetrievedShape(ShapeEstimate):
 
 def by_retrieval(evidence: ShapeEvidence, library: Sequence[LibraryShape]) -> RetrievedShape:
     """Choose the shape of a library that fits best, and bend it to the contacts.
-
-    Args:
-        evidence: readings, with one contact or more.
-        library: one shape or more.
 
     Raises:
         FitRefused: no touch met the object.

@@ -112,14 +112,12 @@ class StrikeBench:
 def summed(
     frequencies: FloatArray, rates: FloatArray, gains: AnyArray, level: SynthesisLevel = "fast"
 ) -> FloatArray:
-    """``(t,)``: the sound of ``(m,)`` gains, as long and at the rate that distances are defined for."""
-    made = synthesize(frequencies, rates, np.asarray(gains)[None], DURATION, RATE, level)
-    sound: FloatArray = made.sound[0]
-    return sound
+    """Synthesize the ``(t,)`` sound of ``(m,)`` gains, as long and at the rate of the distances."""
+    return synthesize(frequencies, rates, np.asarray(gains)[None], DURATION, RATE, level).sound[0]
 
 
 def strike_bench(mesh: Mesh, material: Material, strikes: int, work: RenderingWork) -> StrikeBench:
-    """The strikes of an object; its modes are solved once.
+    """Choose the strikes of an object; its modes are solved once.
 
     Raises:
         MeshRefused: a surface that cannot be filled or solved, or without a mode in hearing.
@@ -327,16 +325,11 @@ _QUADRATIC_PARTS = 4
 
 
 def between_nodes(modes: Modes, allowed: BoolArray, each: int, seed: int) -> SoundSamples:
-    """Random places between nodes, with the shapes that the elements give there.
+    """Sample places between nodes, as many in each face, with the shapes that the elements give there.
 
     Quadratic in each face of a ten-node cell where ``modes`` lists them as ``harness.sim.modal.modal`` does,
-    else linear in each triangle. Places and shapes of the curved face belong together.
-
-    Args:
-        modes: of the object.
-        allowed: ``(n,)``: nodes that may be shown; a face with any other gives nothing.
-        each: places in every face.
-        seed: of the places.
+    else linear in each triangle. Places and shapes of the curved face belong together. Faces with a node that
+    is not among the ``(n,)`` allowed ones give nothing.
     """
     faces, quadratic = _elements(modes.faces)
     faces = np.repeat(faces[allowed[faces].all(axis=1)], each, axis=0)

@@ -130,14 +130,7 @@ class TouchBench:
 def touch_bench(
     mesh: Mesh, presses: int, kind: Kind, work: RenderingWork, codes: NodeSearch | None = None
 ) -> TouchBench:
-    """The presses of an object.
-
-    Args:
-        mesh: of the object.
-        presses: that are drawn; those that are impossible are left out.
-        kind: of presses.
-        work: is informed.
-        codes: of an ObjectFile that is to answer them too: a press that its codes refuse is left out.
+    """Sample presses of an object; those that are impossible or that its codes refuse are left out.
 
     Raises:
         OutOfDomain: no press is possible.

@@ -151,12 +151,7 @@ class ObjectAudio:
 
 
 def open_audio(of: ObjectFile, level: AudioLevel = "network", threads: int = 1) -> ObjectAudio:
-    """The sound of an object at a level.
-
-    Args:
-        of: an object that has a sound.
-        level: ``"network"`` or ``"table"``.
-        threads: that the network may use.
+    """Open the sound of an object at a level.
 
     Raises:
         DataRefused: the object has no sound, or not at that level; or a file of it is damaged.

@@ -100,12 +100,7 @@ def with_audio(of: ObjectFile, part: AudioPart) -> ObjectFile:
 
 
 def network_tensors(modes: int, near_surface: float) -> tuple[Input, Tensor]:
-    """What every network of sound takes and gives.
-
-    Args:
-        modes: that it knows the shapes of.
-        near_surface: m, the farthest from the object's surface that a query may be.
-    """
+    """Describe input and output of a network of sound; ``near_surface`` is the limit of ``AudioPart``."""
     points = Input(
         name="points",
         dtype="float64",

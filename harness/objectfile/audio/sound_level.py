@@ -66,9 +66,15 @@ def modes_from(
         nodes = mesh_from_ply(of.read(entry.table.surface), entry.table.surface.file)
     elif level == "network":
         nodes = with_edges_below(of.mesh, default_edge(of.mesh, of.material, entry.frequencies_hz[-1]))
-    everywhere = sound.as_modes(nodes)
-    lowest = _lowest(everywhere, count, limit)
-    return replace(lowest, seconds={"objectfile": time.perf_counter() - begun})
+    modes = sound.as_modes(nodes)
+    reached = min(modes.limit, limit)
+    if count < len(modes.frequencies) and modes.frequencies[count] <= limit:
+        reached = float(0.5 * (modes.frequencies[count - 1] + modes.frequencies[count]))
+    lowest = np.ascontiguousarray(modes.shapes[:, :count])
+    seconds = {"objectfile": time.perf_counter() - begun}
+    return replace(
+        modes, frequencies=modes.frequencies[:count], shapes=lowest, limit=reached, seconds=seconds
+    )
 
 
 def _require_dampings(of: ObjectFile, entry: AudioEntry, material: Material) -> None:
@@ -85,11 +91,7 @@ def _require_dampings(of: ObjectFile, entry: AudioEntry, material: Material) -> 
 
 
 def _count(of: ObjectFile, entry: AudioEntry, most: int, limit: float) -> int:
-    """How many of the modes are kept.
-
-    Raises:
-        WrongUse: it was built with fewer than are asked for.
-    """
+    """Return how many modes are kept; ``WrongUse`` if the object was built with fewer than requested."""
     frequencies = np.array(entry.frequencies_hz)
     heard = int(np.count_nonzero(frequencies <= limit))
     if heard == len(frequencies) and entry.complete_up_to_hz < limit and heard + _SPARE < most:
@@ -104,15 +106,3 @@ def _count(of: ObjectFile, entry: AudioEntry, most: int, limit: float) -> int:
     ):
         count -= 1
     return count or min(most, heard)
-
-
-def _lowest(modes: Modes, count: int, limit: float) -> Modes:
-    reached = min(modes.limit, limit)
-    if count < len(modes.frequencies) and modes.frequencies[count] <= limit:
-        reached = float(0.5 * (modes.frequencies[count - 1] + modes.frequencies[count]))
-    return replace(
-        modes,
-        frequencies=modes.frequencies[:count],
-        shapes=np.ascontiguousarray(modes.shapes[:, :count]),
-        limit=reached,
-    )

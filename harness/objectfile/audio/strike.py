@@ -56,14 +56,9 @@ class StruckSound:
 
 
 def place_near(surface: SurfaceSearch, point: ArrayLike, most: float) -> Place:
-    """The place of a surface nearest to ``(3,)`` a point in m.
+    """Find the place of a surface nearest to a ``(3,)`` point, at most ``most`` away, in m.
 
-    Its normal is that of the face it lies on.
-
-    Args:
-        surface: of the object.
-        point: m, in the object's frame.
-        most: m, the farthest it may be from the surface.
+    Its normal is that of its face.
 
     Raises:
         WrongUse: it is not three finite numbers.
@@ -165,12 +160,10 @@ def strike(
 
 
 def pushes(audio: ObjectAudio, mesh: Mesh, count: int) -> FloatArray:
-    """``(f, 3, k)`` 1/sqrt(kg): the gains of a unit push into the surface, at the corners of each face.
+    """Compute gains of the lowest modes for a unit push into the surface, at the corners of each face.
 
-    Args:
-        audio: the object's sound.
-        mesh: near to its surface.
-        count: modes, the lowest; ``k`` is that, or how many there are.
+    Returns:
+        ``(f, 3, k)`` 1/sqrt(kg).
     """
     lowest = [
         audio.at(mesh.vertices[first : first + CHUNK])[:, :count]
