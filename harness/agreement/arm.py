@@ -7,10 +7,11 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from harness.agreement.agreement import Residual, SenseResiduals
-from harness.agreement.place_noise import PlaceNoise, shared_twists
+from harness.agreement.place_noise import own_covariance, shared_twists
 from harness.agreement.subject import PressedContact, Subject, refusal_notes
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_from_quaternion, rotation_from_vector, transform
+from harness.bench.gap import BenchErrors
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 from harness.twin.bench import TwinBench
@@ -45,19 +46,17 @@ class ContactDepth:
     own: float  #: m, one sigma of the contact's own.
 
 
-def compare_with_twin(
-    subject: Subject, contacts: Sequence[PressedContact], noise: PlaceNoise | None = None
-) -> SenseResiduals:
-    """Compare joints and contacts of a run with the twin of its scene; ``noise`` is the station's if None.
+def compare_with_twin(subject: Subject, contacts: Sequence[PressedContact]) -> SenseResiduals:
+    """Compare joints and contacts of a run with the twin of its scene.
 
     Raises:
         WrongUse: the object cannot stand in the scene.
     """
-    run, noise = subject.run, noise or PlaceNoise.at(subject.run.station.errors)
+    run = subject.run
     bench = twin_of(subject.scene, run.station, subject.mesh, subject.base_from_object)
     joints = [found for record in run.recording.steps() if (found := joint_residual(run, record)) is not None]
     read = [contact for contact in contacts if not contact.refusal]
-    depths = [contact_depth(bench, subject.base_from_object, contact, noise) for contact in read]
+    depths = [contact_depth(bench, subject.base_from_object, contact, run.station.errors) for contact in read]
     residuals = sorted((*joints, *depth_residuals(depths)), key=lambda residual: residual.step)
     why = "; ".join(refusal_notes(contacts)) or ("" if residuals else "no pose of the arm was recorded")
     return SenseResiduals("arm", "twin", tuple(residuals), why)
@@ -79,7 +78,7 @@ def joint_residual(run: RunFiles, record: StepRecord) -> Residual | None:
 
 
 def contact_depth(
-    bench: TwinBench, base_from_object: FloatArray, contact: PressedContact, noise: PlaceNoise
+    bench: TwinBench, base_from_object: FloatArray, contact: PressedContact, errors: BenchErrors
 ) -> ContactDepth:
     """One contact's depth, and how far each error moves it."""
     pose = contact.seen.base_from_gel
@@ -90,8 +89,8 @@ def contact_depth(
         changes.append(ahead - behind)
     slope = np.asarray(np.array(changes) / (2.0 * _STEPS))
     read, expected = max(0.0, float(contact.heights.max())), max(0.0, bench.pad_depth(pose))
-    shared = slope @ shared_twists(noise, pose, base_from_object[:3, 3])
-    own = float(np.sqrt(slope @ noise.own @ slope + READ**2 + (GAIN * read) ** 2))
+    shared = slope @ shared_twists(errors, pose, base_from_object[:3, 3])
+    own = float(np.sqrt(slope @ own_covariance(errors) @ slope + READ**2 + (GAIN * read) ** 2))
     return ContactDepth(contact.step, read, expected, shared, own)
 
 

@@ -12,12 +12,13 @@ import cv2
 import numpy as np
 
 from harness.agreement.agreement import Residual, SenseResiduals, SideBySide
-from harness.agreement.place_noise import PlaceNoise
+from harness.agreement.place_noise import POSITION
 from harness.agreement.subject import Subject
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import DataRefused
 from harness.basics.geometry import apply, rotation_from_vector
 from harness.basics.mesh import Mesh, hull_of
+from harness.bench.gap import BenchErrors
 from harness.bench.instruments.cameras import CameraSection
 from harness.picture.camera_errors import CameraErrors
 from harness.picture.object_mask import overlap
@@ -40,21 +41,18 @@ class OutlineNoise:
     noise, and what the surface is off by."""
 
 
-def compare_camera(
-    subject: Subject, places: PlaceNoise | None = None, noise: OutlineNoise | None = None
-) -> SenseResiduals:
-    """Compare the outline in every picture of the scene camera with the model's; noises may be given."""
+def compare_camera(subject: Subject) -> SenseResiduals:
+    """Compare the outline in every picture of the scene camera with the model's."""
     run, residuals, notes = subject.run, list[Residual](), list[str]()
     none = SenseResiduals("camera", "reference", (), "no picture by the scene camera was recorded")
     if run.station.camera is None:
         return none
-    places, noise = places or PlaceNoise.at(run.station.errors), noise or OutlineNoise()
     view = OutlineView(subject.mesh, subject.base_from_object, run.station.camera)
     for record in run.recording.steps():
         try:
             mask = run.silhouette(record)
             if mask is not None:
-                residuals += _residuals(view, record.step.index, mask, places, noise)
+                residuals += _residuals(view, record.step.index, mask, run.station.errors)
         except DataRefused as refusal:
             notes.append(f"step {record.step.index + 1}: {refusal}")
     if not residuals and not notes:
@@ -62,9 +60,7 @@ def compare_camera(
     return SenseResiduals("camera", "reference", tuple(residuals), "; ".join(notes))
 
 
-def _residuals(
-    view: "OutlineView", step: int, mask: BoolArray, places: PlaceNoise, noise: OutlineNoise
-) -> list[Residual]:
+def _residuals(view: "OutlineView", step: int, mask: BoolArray, errors: BenchErrors) -> list[Residual]:
     seen = read_outline(mask)
     outlines = (seen.extents, view.extents(np.zeros(_UNKNOWNS)))
     filled = []
@@ -76,12 +72,12 @@ def _residuals(
     read, modelled = filled
     sides = SideBySide(read.astype(np.float64), modelled.astype(np.float64), "covered")
     shared = {"overlap": overlap(read, modelled)}
-    found = outline_residuals(step, view, seen, places, noise)
+    found = outline_residuals(step, view, seen, errors, OutlineNoise())
     return [replace(one, numbers={**one.numbers, **shared}, sides=sides) for one in found]
 
 
 def outline_residuals(
-    step: int, view: "OutlineView", seen: SeenOutline, places: PlaceNoise, noise: OutlineNoise
+    step: int, view: "OutlineView", seen: SeenOutline, errors: BenchErrors, noise: OutlineNoise
 ) -> tuple[Residual, ...]:
     """Compare place and shape of an outline with the model's; hidden directions do not count.
 
@@ -92,7 +88,7 @@ def outline_residuals(
     if not free.any():
         raise DataRefused("the object's outline is hidden, or cut off by the picture's border, all around")
     gaps = (seen.extents - view.extents(np.zeros(_UNKNOWNS)))[free]
-    patterns, sizes, _ = np.linalg.svd(view.slopes(places, noise.camera)[free])
+    patterns, sizes, _ = np.linalg.svd(view.slopes(errors, noise.camera)[free])
     along = patterns.T @ gaps
     variances = np.full(len(gaps), noise.read**2)
     variances[: len(sizes)] += sizes**2
@@ -143,8 +139,8 @@ class OutlineView:
         places = (1.0 + focal) * self._camera.focal_length * seen[:, :2] / seen[:, 2:] + middle
         return np.asarray((directions() @ places.T).max(axis=1))
 
-    def slopes(self, places: PlaceNoise, camera: CameraErrors) -> FloatArray:
+    def slopes(self, errors: BenchErrors, camera: CameraErrors) -> FloatArray:
         """``(72, 14)`` pixels for one sigma of everything that may be off."""
-        of_object = [*3 * [places.position], places.tilt, places.tilt, places.yaw, places.scale]
+        of_object = [*3 * [POSITION], errors.tilt, errors.tilt, errors.yaw, errors.scale]
         sigmas = [*of_object, *3 * [camera.position], *3 * [camera.rotation], camera.focal_length]
         return np.array([0.5 * (self.extents(one) - self.extents(-one)) for one in np.diag(sigmas)]).T

@@ -111,25 +111,8 @@ class PhaseNoise:
     near: float = 0.04  #: most logarithm between a peak's frequency and that of its mode.
 
 
-def compare_sound(
-    subject: Subject,
-    source: Source,
-    contacts: Sequence[PressedContact],
-    noise: ResonanceNoise | None = None,
-    shares: ShareNoise | None = None,
-    phases: PhaseNoise | None = None,
-) -> SenseResiduals:
-    """Compare the resonances of a run with a model's modes, and how its strikes share them.
-
-    Args:
-        subject: the object.
-        source: the ObjectFile's network, or finite elements.
-        contacts: contacts of the run.
-        noise: noise of the resonances; None for the default, as of the next two.
-        shares: noise of the strikes' levels.
-        phases: noise of the strikes' phases.
-    """
-    noise, shares, phases = noise or ResonanceNoise(), shares or ShareNoise(), phases or PhaseNoise()
+def compare_sound(subject: Subject, source: Source, contacts: Sequence[PressedContact]) -> SenseResiduals:
+    """Compare the resonances of a run with a model's modes, and how its strikes share them."""
     struck = [contact for contact in contacts if contact.seen.strike is not None]
     if not struck:
         return SenseResiduals("sound", source, (), "no contact was struck")
@@ -143,9 +126,9 @@ def compare_sound(
     except TouchstoneError as refusal:
         return SenseResiduals("sound", source, (), str(refusal))
     assert modes is not None  # they were wanted
-    resonances = resonance_residual(struck[-1].step, peaks, np.asarray(modes.frequencies), noise)
+    resonances = resonance_residual(struck[-1].step, peaks, np.asarray(modes.frequencies), ResonanceNoise())
     places = struck_modes(subject, struck, modes, resonances.numbers["factor"], error)
-    still = microphone_residual(struck[-1].step, evidence.peaks, places, shares, phases)
+    still = microphone_residual(struck[-1].step, evidence.peaks, places, ShareNoise(), PhaseNoise())
     return SenseResiduals("sound", source, (resonances,) if still is None else (resonances, still))
 
 

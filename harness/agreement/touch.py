@@ -21,12 +21,13 @@ from scipy.stats import binom, chi2
 
 from harness.agreement.agreement import Residual, SenseResiduals, SideBySide, Source
 from harness.agreement.arm import twisted
-from harness.agreement.place_noise import PlaceNoise, twist_covariance
+from harness.agreement.place_noise import twist_covariance
 from harness.agreement.stated_error import gross_share, map_errors
 from harness.agreement.subject import SEEN, PressedContact, Subject, refusal_notes
 from harness.basics.arrays import BoolArray, FloatArray, block_means
 from harness.basics.errors import OutOfDomain, WrongUse
 from harness.basics.geometry import inverse
+from harness.bench.gap import BenchErrors
 from harness.effects.quantities import Quantities
 
 _IMPROBABLE = 0.01
@@ -81,29 +82,15 @@ class SurfaceNoise:
     is a few blocks far off, another object is all of them off."""
 
 
-def compare_touch(
-    subject: Subject,
-    source: Source,
-    contacts: Sequence[PressedContact],
-    places: PlaceNoise | None = None,
-    noise: SurfaceNoise | None = None,
-) -> SenseResiduals:
-    """Compare every contact's surface of the gel with a model's.
-
-    Args:
-        subject: the object.
-        source: the ObjectFile's network, or the reference.
-        contacts: contacts of the run.
-        places: noise of the gel's pose; None for the station's.
-        noise: noise of the surface; None for the default.
-    """
-    places, noise = places or PlaceNoise.at(subject.run.station.errors), noise or SurfaceNoise()
+def compare_touch(subject: Subject, source: Source, contacts: Sequence[PressedContact]) -> SenseResiduals:
+    """Compare every contact's surface of the gel with a model's, by the network or the reference."""
+    errors, noise = subject.run.station.errors, SurfaceNoise()
     residuals, notes = [], refusal_notes(contacts)
     for contact in contacts:
         if contact.refusal:
             continue
         try:
-            found = likeliest(subject, source, contact, places, noise)
+            found = likeliest(subject, source, contact, errors, noise)
         except WrongUse as refusal:
             return SenseResiduals("touch", source, (), str(refusal))
         except OutOfDomain as refusal:
@@ -186,7 +173,7 @@ def counted_residual(residuals: Sequence[Residual], gross: float) -> Residual:
 
 
 def likeliest(
-    subject: Subject, source: Source, contact: PressedContact, places: PlaceNoise, noise: SurfaceNoise
+    subject: Subject, source: Source, contact: PressedContact, errors: BenchErrors, noise: SurfaceNoise
 ) -> Surfaces:
     """Find the pose between reading and prior at which a contact fits best, and both surfaces there.
 
@@ -194,7 +181,7 @@ def likeliest(
         OutOfDomain: no network was made for the stated pose, or for those at which it would fit.
         WrongUse: the network is of another gel or object.
     """
-    return _Search(subject, source, contact, places, noise).best()
+    return _Search(subject, source, contact, errors, noise).best()
 
 
 class _Search:
@@ -205,7 +192,7 @@ class _Search:
         subject: Subject,
         source: Source,
         contact: PressedContact,
-        places: PlaceNoise,
+        errors: BenchErrors,
         noise: SurfaceNoise,
     ) -> None:
         self._subject, self._source, self._noise = subject, source, noise
@@ -220,7 +207,7 @@ class _Search:
         self._errors = map_errors(subject, source)
         self._error = float(np.sqrt(np.mean(self._errors**2)))
         anchor = subject.base_from_object[:3, 3]
-        self._root = np.linalg.cholesky(twist_covariance(places, self._pose, anchor))
+        self._root = np.linalg.cholesky(twist_covariance(errors, self._pose, anchor))
 
     def best(self) -> Surfaces:
         """Search once, and again from other starts where the first search fits badly."""

@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from harness.authoring.catalogue.rows import ExcludedRow
 from harness.basics.errors import CalibrationRefused, WrongUse
 from harness.basics.files.json_file import read_model, write_model
 from harness.basics.toml_file import StrictModel
@@ -83,20 +84,13 @@ class BuildFolder:
         self.arrays.mkdir(parents=True, exist_ok=True)
 
 
-class ExcludedEntry(StrictModel):
-    """A row that was not built, and why."""
-
-    name: str
-    reason: str
-
-
 class BuildSettings(StrictModel):
     """The last build of a folder."""
 
     schema_version: Literal[1] = Field(default=1, alias="schema")  #: of this file.
     catalogue: str  #: path of its file.
     names: tuple[str, ...]  #: of the objects, in the catalogue's order.
-    excluded: tuple[ExcludedEntry, ...] = ()  #: rows that were not built.
+    excluded: tuple[ExcludedRow, ...] = ()  #: rows that were not built.
 
 
 def read_settings(of: BuildFolder) -> BuildSettings:

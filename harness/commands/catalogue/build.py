@@ -68,7 +68,7 @@ def build(
     """
     options.require_folders(("--out", out), ("--stages", stages))
     from harness.authoring.catalogue.build import build_plan, held
-    from harness.authoring.catalogue.layout import BuildFolder, BuildSettings, ExcludedEntry
+    from harness.authoring.catalogue.layout import BuildFolder, BuildSettings
     from harness.authoring.catalogue.worker import Job, WorkerLimits
     from harness.basics.files.json_file import write_model
     from harness.basics.quantities import TIME
@@ -85,8 +85,8 @@ def build(
     records: list[ObjectRecord] = []
     with held(of):
         names = tuple(item.row.name for item in plan.items)
-        entries = tuple(ExcludedEntry(name=row.name, reason=row.reason) for row in excluded)
-        write_model(BuildSettings(catalogue=str(catalogue), names=names, excluded=entries), of.settings)
+        settings = BuildSettings(catalogue=str(catalogue), names=names, excluded=tuple(excluded))
+        write_model(settings, of.settings)
         if plan.waiting:
             with build_progress(len(plan.waiting)) as count:
                 shutil.rmtree(of.aside, ignore_errors=True)

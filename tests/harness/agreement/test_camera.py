@@ -6,10 +6,11 @@ from scipy.stats import chi2, kstest
 
 from harness.agreement.agreement import Residual
 from harness.agreement.camera import OutlineNoise, OutlineView, outline_residuals
-from harness.agreement.place_noise import PlaceNoise
+from harness.agreement.place_noise import POSITION
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import DataRefused
 from harness.basics.geometry import translation
+from harness.bench.gap import USUAL
 from harness.bench.station_file import load_station, station_path
 from harness.objects.builtin import build
 from harness.picture.outline import DIRECTIONS, SeenOutline
@@ -17,7 +18,7 @@ from harness.picture.outline import DIRECTIONS, SeenOutline
 CAMERA = load_station(station_path("mock")).camera
 PLACE = translation(np.array([-0.42, 0.0, 0.25]))
 OPEN = np.zeros(DIRECTIONS, np.bool_)
-PLACES, NOISE = PlaceNoise(), OutlineNoise()
+NOISE = OutlineNoise()
 
 
 @pytest.fixture(scope="module")
@@ -27,13 +28,13 @@ def view() -> OutlineView:
 
 
 def sigmas() -> FloatArray:
-    of, at = NOISE.camera, PLACES
-    groups = [3 * [at.position], [at.tilt, at.tilt, at.yaw, at.scale], 3 * [of.position], 3 * [of.rotation]]
+    of, at = NOISE.camera, USUAL
+    groups = [3 * [POSITION], [at.tilt, at.tilt, at.yaw, at.scale], 3 * [of.position], 3 * [of.rotation]]
     return np.array([*np.concatenate(groups), of.focal_length])
 
 
 def compared(view: OutlineView, extents: FloatArray, hidden: BoolArray = OPEN) -> tuple[Residual, ...]:
-    return outline_residuals(0, view, SeenOutline(extents, hidden), PLACES, NOISE)
+    return outline_residuals(0, view, SeenOutline(extents, hidden), USUAL, NOISE)
 
 
 @pytest.mark.slow  # many drawn cases of a statistic
@@ -70,7 +71,7 @@ def test_what_is_hidden_does_not_count(view: OutlineView) -> None:
 
 def test_an_outline_that_is_hidden_all_around_is_refused(view: OutlineView) -> None:
     with pytest.raises(DataRefused, match="hidden"):
-        outline_residuals(0, view, SeenOutline(np.zeros(DIRECTIONS), ~OPEN), PLACES, NOISE)
+        outline_residuals(0, view, SeenOutline(np.zeros(DIRECTIONS), ~OPEN), USUAL, NOISE)
 
 
 def test_an_object_behind_the_camera_is_refused() -> None:

@@ -5,9 +5,10 @@ import pytest
 from scipy.stats import kstest
 
 from harness.agreement.arm import ContactDepth, depth_residuals, twisted
-from harness.agreement.place_noise import PlaceNoise, shared_twists, twist_covariance
+from harness.agreement.place_noise import POSITION, shared_twists, twist_covariance
 from harness.agreement.sound import ResonanceNoise, matched, resonance_residual
 from harness.basics.geometry import apply, inverse, rotation_from_vector, transform
+from harness.bench.gap import USUAL
 
 POSE = transform(rotation_from_vector(np.array([0.3, 2.0, -0.4])), np.array([-0.40, 0.05, 0.31]))
 ANCHOR = np.array([-0.42, 0.0, 0.25])
@@ -42,21 +43,21 @@ def test_a_shared_error_is_counted_once() -> None:
 def test_what_an_object_is_off_by_moves_the_gel_in_its_frame(which: int) -> None:
     """To first order, against moving the object itself."""
     # A larger object's own points are farther apart too, which no twist is: its size is seen at the centre.
-    noise, point = PlaceNoise(), np.array([[0.004, -0.003, 0.0]]) * (which < 6)
+    point = np.array([[0.004, -0.003, 0.0]]) * (which < 6)
     unit = np.zeros(7)
     unit[which] = 1e-2
-    sigmas = np.array([noise.position] * 3 + [noise.tilt, noise.tilt, noise.yaw, noise.scale])
+    sigmas = np.array([POSITION] * 3 + [USUAL.tilt, USUAL.tilt, USUAL.yaw, USUAL.scale])
     moved, turn, grown = np.split(sigmas * unit, [3, 6])
     base_from_object = transform(rotation_from_vector(turn) * (1.0 + grown), ANCHOR + moved)
     undone = np.linalg.inv(base_from_object) @ POSE
-    twist = shared_twists(noise, POSE, ANCHOR)[:, which] * 1e-2
+    twist = shared_twists(USUAL, POSE, ANCHOR)[:, which] * 1e-2
     stated = inverse(transform(np.eye(3), ANCHOR)) @ twisted(POSE, twist)
     apart = apply(undone, point) - apply(stated, point)
     assert np.linalg.norm(apart) < 2e-2 * np.linalg.norm(twist[:3]) + 1e-7
 
 
 def test_a_covariance_can_be_drawn_from() -> None:
-    assert np.linalg.eigvalsh(twist_covariance(PlaceNoise(), POSE, ANCHOR)).min() > 0.0
+    assert np.linalg.eigvalsh(twist_covariance(USUAL, POSE, ANCHOR)).min() > 0.0
 
 
 def test_modes_that_all_sound_higher_explain_every_peak() -> None:

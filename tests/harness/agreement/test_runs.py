@@ -11,11 +11,11 @@ from experiments.contact_localization.cells import ContactCell
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.section import Localization
 from harness.agreement.compare_run import agreement_of
-from harness.agreement.place_noise import PlaceNoise
 from harness.agreement.stated_error import gain_error, map_errors
 from harness.agreement.subject import Subject, contacts_of, own_subject, subject_of_file
 from harness.agreement.touch import SurfaceNoise, compare_touch, likeliest
 from harness.basics.errors import WrongUse
+from harness.bench.gap import USUAL
 from harness.bench.scene import scene_from_options
 from harness.bench.scene_objectfile import shipped_objectfiles
 from harness.bench.station_file import load_station, station_path
@@ -131,8 +131,8 @@ def measured_gain(subject: Subject) -> float:
 
 
 def test_what_a_network_is_off_by_counts_beside_the_noise_of_the_surface(run: RunFiles) -> None:
-    subject, places, noise = subject_of_file(run, shipped_objectfiles()["mug"]), PlaceNoise(), SurfaceNoise()
-    found = likeliest(subject, "network", contacts_of(run)[0], places, noise)
+    subject, noise = subject_of_file(run, shipped_objectfiles()["mug"]), SurfaceNoise()
+    found = likeliest(subject, "network", contacts_of(run)[0], USUAL, noise)
     errors = map_errors(subject, "network")
     share = found.compared.mean()
     added = found.variances[:, found.compared].mean(axis=1)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from harness.agreement.place_noise import PlaceNoise
 from harness.basics.errors import WrongUse
 from harness.bench.gap import USUAL, BenchErrors
 from harness.bench.named_files import SHIPPED
@@ -22,7 +21,6 @@ def stated(folder: Path, lines: str) -> Station:
 
 def test_a_station_that_states_none_has_the_usual_errors() -> None:
     assert load_station(MOCK).errors == USUAL
-    assert PlaceNoise.at(USUAL) == PlaceNoise()
 
 
 def test_what_a_station_states_is_read_in_si_and_survives_a_recording(tmp_path: Path) -> None:
@@ -32,7 +30,7 @@ def test_what_a_station_states_is_read_in_si_and_survives_a_recording(tmp_path: 
     )
     tree = json.loads(json.dumps(station.model_dump(mode="json", by_alias=True)))
     assert station_from_json(tree, "the run").errors == station.errors
-    assert PlaceNoise.at(station.errors).gel_centre == 1.25e-3
+    assert station.errors.gel_centre == 1.25e-3
     del tree["errors"]  # as runs carry it that were made before a station could state any
     assert station_from_json(tree, "the run").errors == USUAL
 
