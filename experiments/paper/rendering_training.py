@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from experiments.paper.hexahedra import is_within
 from experiments.paper.look import REACH, ViewBench, ball_of
-from experiments.paper.rendering import FieldSpec, FitSpec
+from experiments.paper.rendering import FieldSpec, FitSpec, grid_places
 from experiments.paper.sound import (
     ANYWHERE,
     AUDIONET_EPOCHS,
@@ -29,7 +29,6 @@ from experiments.paper.touch import (
     PressInputs,
     TouchBench,
     colours_pair,
-    pixel_places,
     touchnet_pair,
 )
 from harness.authoring.audio.waves import error_shares, solve_readout
@@ -197,7 +196,7 @@ def train_colours(bench: TouchBench, spec: FitSpec, report: Report) -> bytes:
     points = (places.nodes.points[chosen] - low) / (high - low)
     pictures = np.stack([bench.picture(each) for each in reference.maps[chosen]])
     colours = pictures.reshape(len(chosen), -1, 3)
-    pixels = pixel_places((places.sensor.rows, places.sensor.columns))
+    pixels = grid_places(-1.0, (places.sensor.rows, places.sensor.columns))
 
     def draw(random: np.random.Generator) -> tuple[FloatArray, AnyArray, AnyArray]:
         place = random.integers(len(points), size=spec.batch)

@@ -24,6 +24,7 @@ from experiments.paper.rendering import (
     RenderingMethod,
     RenderingWork,
     Sense,
+    grid_places,
     train_network,
 )
 from harness.authoring.audio.audio import opened, waves_graph
@@ -168,8 +169,7 @@ class SpectrumBasis:
     @cached_property
     def places(self) -> FloatArray:
         """``(f t, 2)``: frequency and time of each bin, 0 to 1."""
-        rows, columns = (np.linspace(0.0, 1.0, size) for size in self.bins)
-        return np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1).reshape(-1, 2)
+        return grid_places(0.0, self.bins)
 
     def spectrum(self, gains: AnyArray) -> AnyArray:
         """``(f, t)`` complex: of ``(m,)`` gains of the modes that are in it."""

@@ -21,6 +21,7 @@ from experiments.paper.rendering import (
     RenderingMethod,
     RenderingWork,
     Sense,
+    grid_places,
     picture_scores,
     train_network,
 )
@@ -158,12 +159,6 @@ def touch_bench(
 COLOURS_FILE = "touch_colours.onnx"
 
 
-def pixel_places(shape: tuple[int, int]) -> FloatArray:
-    """``(rows * columns, 2)``: where a pixel is, -1 .. 1, row by row."""
-    rows, columns = (np.linspace(-1.0, 1.0, size) for size in shape)
-    return np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
 def colours_pair() -> tuple[Input, Tensor]:
     """Describe the input and the output tensor of the network."""
     box = Domain(low=(0.0, 0.0, 0.0, -1.0, -1.0), high=(1.0,) * 5)
@@ -231,7 +226,7 @@ def first_touch(bench: TouchBench, work: RenderingWork, suffix: str = "") -> Ren
 
         def picture(number: int) -> ByteArray:
             point = (bench.presses.points[number] - low) / (high - low)
-            pixels = pixel_places(shape)
+            pixels = grid_places(-1.0, shape)
             rows = np.concatenate([np.broadcast_to(point, (len(pixels), 3)), pixels], axis=1)
             grey = np.clip(np.rint(127.5 * (network({"place": rows})["colours"] + 1.0)), 0.0, 255.0)
             return grey.astype(np.uint8).reshape(*shape, 3)

@@ -5,7 +5,7 @@ found anew at each contact, and what it is off by counts beside what the surface
 A network is wrong altogether at some places, so that no single contact speaks against an object; how many do
 not fit is binomial where the object is right.
 
-``likeliest`` finds the pose of the gel at which a contact's picture and a model of the object agree best.
+``PoseSearch`` finds the pose of the gel at which a contact's picture and a model of the object agree best.
 Eight numbers of a contact are known to a stated sigma only: six of the gel's pose, the gain by which its
 picture shows heights, and how far it hangs from what it touches. They are found between the reading and their
 prior (Gauss-Newton, slopes by differences). For errors that are normal, what is left at the best of them,
@@ -90,7 +90,7 @@ def compare_touch(subject: Subject, source: Source, contacts: Sequence[PressedCo
         if contact.refusal:
             continue
         try:
-            found = likeliest(subject, source, contact, errors, noise)
+            found = PoseSearch(subject, source, contact, errors, noise).best()
         except WrongUse as refusal:
             return SenseResiduals("touch", source, (), str(refusal))
         except OutOfDomain as refusal:
@@ -172,20 +172,8 @@ def counted_residual(residuals: Sequence[Residual], gross: float) -> Residual:
     return Residual(residuals[-1].step, "contacts together", chi_square, 2.0, numbers)
 
 
-def likeliest(
-    subject: Subject, source: Source, contact: PressedContact, errors: BenchErrors, noise: SurfaceNoise
-) -> Surfaces:
-    """Find the pose between reading and prior at which a contact fits best, and both surfaces there.
-
-    Raises:
-        OutOfDomain: no network was made for the stated pose, or for those at which it would fit.
-        WrongUse: the network is of another gel or object.
-    """
-    return _Search(subject, source, contact, errors, noise).best()
-
-
-class _Search:
-    """One contact's likeliest pose, gain and skirt, each over its sigma: ``(8,)``."""
+class PoseSearch:
+    """A search for one contact's likeliest pose, gain and skirt, each over its sigma: ``(8,)``."""
 
     def __init__(
         self,
@@ -210,7 +198,14 @@ class _Search:
         self._root = np.linalg.cholesky(twist_covariance(errors, self._pose, anchor))
 
     def best(self) -> Surfaces:
-        """Search once, and again from other starts where the first search fits badly."""
+        """Find the pose between reading and prior that fits best, and both surfaces there.
+
+        Other starts are tried where the first search fits badly.
+
+        Raises:
+            OutOfDomain: no network was made for the stated pose, or for those at which it would fit.
+            WrongUse: the network is of another gel or object.
+        """
         found: list[tuple[float, FloatArray, FloatArray]] = []
         for places in (_ASIDE[:1], _ASIDE[1:]):
             at, free = self._settled(self._start(places))

@@ -13,7 +13,7 @@ from experiments.contact_localization.section import Localization
 from harness.agreement.compare_run import agreement_of
 from harness.agreement.stated_error import gain_error, map_errors
 from harness.agreement.subject import Subject, contacts_of, own_subject, subject_of_file
-from harness.agreement.touch import SurfaceNoise, compare_touch, likeliest
+from harness.agreement.touch import PoseSearch, SurfaceNoise, compare_touch
 from harness.basics.errors import WrongUse
 from harness.bench.gap import USUAL
 from harness.bench.scene import scene_from_options
@@ -132,7 +132,7 @@ def measured_gain(subject: Subject) -> float:
 
 def test_what_a_network_is_off_by_counts_beside_the_noise_of_the_surface(run: RunFiles) -> None:
     subject, noise = subject_of_file(run, shipped_objectfiles()["mug"]), SurfaceNoise()
-    found = likeliest(subject, "network", contacts_of(run)[0], USUAL, noise)
+    found = PoseSearch(subject, "network", contacts_of(run)[0], USUAL, noise).best()
     errors = map_errors(subject, "network")
     share = found.compared.mean()
     added = found.variances[:, found.compared].mean(axis=1)
