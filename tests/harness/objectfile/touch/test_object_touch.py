@@ -13,8 +13,7 @@ from harness.bench.named_files import SHIPPED
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.touch.nodes import SurfaceNodes, nodes_bytes, nodes_from
 from harness.objectfile.touch.touch import CodeMaps, open_touch
-from harness.objectfile.verify import look_at_codes
-from harness.objectfile.verify import verify
+from harness.objectfile.verify import look_at_codes, verify
 from harness.sim.gel.press_pose import Presses
 from tests.samples import touch_bench as tb
 from tests.samples.object_bench import exchange, rewrite
