@@ -31,7 +31,8 @@ $(RUN): $(VENV)/bin/python pyproject.toml constraints.txt
 
 $(DEV): $(VENV)/bin/python pyproject.toml constraints.txt
 	@echo "installing into $(VENV) (once; a few minutes)"
-	@$(PIP) install --constraint constraints.txt --editable '.[dev]'
+	@$(PIP) install --no-compile --constraint constraints.txt --editable '.[dev]'
+	@$(BIN)/python -m compileall -q -j 0 $(VENV)/lib # pip compiles on one core
 	@touch $(RUN) $@
 
 install: $(RUN) ## the programs, without the developers' tools
