@@ -32,7 +32,7 @@ $(RUN): $(VENV)/bin/python pyproject.toml constraints.txt
 $(DEV): $(VENV)/bin/python pyproject.toml constraints.txt
 	@echo "installing into $(VENV) (once; a few minutes)"
 	@$(PIP) install --no-compile --constraint constraints.txt --editable '.[dev]'
-	@$(BIN)/python -m compileall -q -j 0 $(VENV)/lib # pip compiles on one core
+	@$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true # pip compiles on one core
 	@touch $(RUN) $@
 
 install: $(RUN) ## the programs, without the developers' tools
