@@ -64,7 +64,7 @@ def children(pid: int) -> list[int]:
     return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
-def gone(pids: list[int], address: str, seconds: float = 5.0) -> bool:
+def gone(pids: list[int], address: str, seconds: float = 60.0) -> bool:
     """Whether every process has ended and every port is free again, within so many seconds.
 
     A process whose first thread is dead may hold its ports until the others are.
