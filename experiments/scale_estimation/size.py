@@ -28,10 +28,8 @@ FLOOR = 0.02
 """Share of the uniform density that every sense is mixed with before the product is taken."""
 
 SHARED = 3.0e-3
-"""Of the logarithm: what all senses err by alike. A thing is uneven by a quarter of a millimetre, so that its
-longest side is longer than its drawing's, which neither an outline nor contacts elsewhere tell. Of 207
-recordings sight and touch were each 0.4 % too small on average, and with this 91 % of fused intervals held,
-without it 88 %."""
+"""Error of the logarithm that all senses share: an object's longest side is longer than its model's, by
+unevenness that neither an outline nor contacts elsewhere show."""
 
 UNEVEN_EXCESS = 0.15e-3
 """Mean in m by which a made object's longest side exceeds that of its CAD model at the same scale: the side

@@ -151,8 +151,7 @@ _SUSPICIOUS_BELOW = -8.0
 
 
 USUAL_FIT = 2.6
-"""Twice the nats that a contact's own fit costs at the best hypothesis, on average over calibration runs (24:
-four objects, three seeds, close and spread)."""
+"""Twice the nats that a contact's own fit costs at the best hypothesis, on average over calibration runs."""
 
 
 _SLIPPED = 40.0
@@ -160,8 +159,7 @@ _SLIPPED = 40.0
 
 
 STRAINED = 1.3
-"""Strain up to which errors are taken as stated: one of those 24 runs exceeds it, and 14 of the same 24 on a
-bench whose errors are twice as large."""
+"""Nuisance cost up to which errors are taken as stated."""
 
 
 MOST = 2.0

@@ -21,22 +21,15 @@ from harness.recording.observation import Observation
 from harness.strikes.peaks import analyse
 
 UNEXPLAINED = 0.3
-"""Share of the resonances heard that no mode explains, beyond which the sound may be another object's.
-Calibration runs on the right object: 36 of 131 lie beyond it by sound alone, most of them a pitcher's, whose
-modes are dense, and 11 of 88 by touch and sound; on another object that was not refused, 52 of 54 and 12
-of 13."""
+"""Maximum share of the recorded resonances that no mode explains; above it the object may be another one."""
 
 
 STRANGER = 0.5
-"""Nats by which every resonance that no mode explains speaks against the object. Of a dense object's many
-resonances half may lie between the modes: a nat each refused two right objects of 131."""
+"""Log-likelihood by which every resonance that no mode explains counts against the object."""
 
 
 REFUSE_BELOW = -4.0
-"""Nats of places and sound at the best hypothesis, the worst contact's place left out, and what no mode
-explains counted against it. Calibration runs: on the right object, 131 runs, at least -1.8; on another,
-53 of 195 with close steps and 1 of 198 with spread ones are above the limit, which sound alone therefore
-does not refuse: all but two of them are ``strange``."""
+"""Minimum log-likelihood of places and sound at the best hypothesis, without the worst contact's place."""
 
 
 REFUSE_UNHEARD_BELOW = -12.0

@@ -15,8 +15,7 @@ FEWEST = 3
 """Peaks below which a match by chance is too likely."""
 
 WORTH = 1.4
-"""Nats a peak over chance, below which the object's modes do not explain what was heard. The least of 181
-recordings of hard objects has 1.5."""
+"""Minimum log-likelihood per peak over chance, for the object's modes to explain the recorded sound."""
 
 TEMPER = 0.8
 """Power of the likelihood: modes of one family are off together, so that peaks say less than their number."""
@@ -26,14 +25,12 @@ ALIKE = 0.15
 
 SURE = 0.8
 """Probability of the likeliest size and those alike, below which another one stands beside it: with modes
-an octave off, a handful of peaks is matched by chance. From there to nine tenths the interval reaches into
-both. Of 171 recordings of hard objects that were as sure one was wrong; of 24 objects of other modes ten
-are as sure (tests/hard_cases)."""
+an octave off, a handful of peaks is matched by chance (tests/hard_cases). From there to nine tenths the
+interval reaches into both."""
 
 SHARED = 3.2
 """Modes that share a peak, on average, beyond which no peak is a mode's: a list of peaks then fits many
-sizes, and how well it fits one says little. Of hard objects 1.0 to 2.9 do on recordings of 13 seeds (a body
-of revolution has its modes in pairs), of wood and plastic 3.3 to 15."""
+sizes, and how well it fits one says little. Wood and plastic are above it, hard objects below."""
 
 GRID = 2.5e-3
 """Of the logarithm, between sizes at which the likelihood is computed: a third of the narrowest deviation of
@@ -46,8 +43,7 @@ PEAK_DAMPING_SIGMA = 0.5
 """Likewise, of one peak's."""
 
 SHAPE_SIGMA = 0.024
-"""Relative deviation of all frequencies together that is of wall and unevenness, not of the material: 2.35 %
-on 170 recordings of 31 seeds of the mocked bench, which knows the material's own share."""
+"""Relative deviation of all frequencies together by wall and unevenness, not by the material."""
 
 NINE_TENTHS = 1.645
 """Standard deviations within which nine tenths of a normal distribution lie, each way."""

@@ -25,12 +25,12 @@ from harness.picture.outline import SeenOutline
 
 NOVEL_SIGMA = 0.35
 """Of the size's logarithm, of touch at the usual distance from what was learnt; in proportion nearer to it.
-An arm's ways differ from those drawn for the training. Found on development runs."""
+An arm's paths differ from those sampled for the training."""
 
 WIDER = MappingProxyType({"vision": 1.0, "audio": 4.0, "touch": 2.0})
 """Factor on a sense's spread beside others, where the shape is not known. What each is off by is mostly of
-the shape, which they share, so that their product is surer than it should be; and sound, which is off most,
-is off far beyond a normal density. Found on development runs."""
+the shape, which they share, so that their product is surer than it should be; sound, which is off most,
+is off far beyond a normal density."""
 
 
 @dataclass(frozen=True, eq=False)

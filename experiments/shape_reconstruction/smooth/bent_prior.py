@@ -33,8 +33,7 @@ from experiments.shape_reconstruction.smooth.grid import Grid
 from harness.basics.arrays import FloatArray, IntArray, read_only
 
 AMPLITUDE, LENGTH = 6.0e-3, 20.0e-3
-"""Standard deviation and correlation length of the prior's error, m: the best of five
-pairs on development runs."""
+"""Standard deviation and correlation length of the prior's error, m."""
 
 MARGIN = 30.0e-3
 """Distance from the prior to the border of the grid, m: contacts bend its surface no farther."""

@@ -1,11 +1,8 @@
 """Depth of a press from its picture, with what a contact itself does to the colour taken out.
 
 Two readings. The first, by the smooth model of the calibration, says roughly where the object is: its
-slopes lean, for it takes a contact's own dimming for slope. In the second that dimming is taken out there
-(``harness.sim.optics.contact_depth``). Before both, the light of the moment is compared with the
-calibration's.
-
-What a contact does to the colour whatever its slope, read back from a calibration's own table.
+slopes lean, for it takes a contact's own dimming for slope. In the second that dimming is taken out there.
+Before both, the light of the moment is compared with the calibration's.
 
 A real gel is darker by a dozen grey levels where something touches it, even at the apex of a ball, where it
 is as flat as untouched. The smooth model of ``harness.sim.optics.shading`` has no such term, so that a flat

@@ -1,12 +1,8 @@
 """A sum of decaying sines as products of two tables: underdamped modes after one impulse.
 
 The kernels of ``harness.sim.sound.synthesis_kernels`` make the tables; here is which modes are in them, for
-how long, and in which order they are multiplied. Many modes that hardly die away are left to
-``harness.sim.sound.synthesis_tables``.
-
-A table of sines (``harness.sim.sound.synthesis_tables``) costs as much as its modes are long. Where many
-last,
-a transform is shorter, of any number of them: within a stretch of ``L`` samples a mode times a bell of
+how long, and in which order they are multiplied. A table costs as much as its modes are long. Where many
+last, a transform is shorter, of any number of them: within a stretch of ``L`` samples a mode times a bell of
 Gauss has a spectrum that is a bell again, also where its frequency is complex, so that some
 ``2 REACH + 1`` bins hold it; they are added up for all modes, transformed, and divided by the first bell
 (Greengard and Lee, Accelerating the Nonuniform Fast Fourier Transform, SIAM Review 46(3), 2004).

@@ -3,7 +3,7 @@
 A press is compared with a picture of the untouched gel, its own or the calibration's, and its own resting
 picture with the calibration's. The gel's resting pattern gives the change of the light, the channel order and
 the orientation of each pair (``harness.sim.optics.check.light``). The change of colour that the press made is
-then compared with the calibration's shading (``harness.sim.optics.check.picture_check``).
+then compared with the calibration's shading.
 """
 
 from dataclasses import dataclass
