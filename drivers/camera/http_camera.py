@@ -199,7 +199,8 @@ class HttpCamera:
     @property
     def rate(self) -> float:
         """Frames a second over the newest frames of this connection; zero before two have arrived."""
-        times = [time for time in self._recent_times() if time > self._opened]
+        with self._arrived:
+            times = [frame.time for frame in self._frames if frame.time > self._opened]
         return (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0
 
     @property
@@ -231,10 +232,6 @@ class HttpCamera:
             f"{self.name} is frozen: {self._same_frames} frames in {lasted:.1f} s are one and the same "
             f"picture; restart the camera or the program that serves {self.url}"
         )
-
-    def _recent_times(self) -> list[float]:
-        with self._arrived:
-            return [frame.time for frame in self._frames]
 
     def _next_frames(self, count: int, after: float, until: float) -> list[Frame]:
         """The first ``count`` frames after ``after`` on the bench clock; fewer where it reaches ``until``."""

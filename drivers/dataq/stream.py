@@ -175,7 +175,7 @@ class ScanStream:
 
         def decided() -> bool:
             restless = self._monitor.prompt >= end + _UNREST * self._rate
-            return self._over(first) or restless or self._proven >= end
+            return bool(self._dead) or self._stretch != first.stretch or restless or self._proven >= end
 
         with self._changed:
             timeout = max(0, end - self._total) / self._rate + _PROOF_TIMEOUT
@@ -223,9 +223,6 @@ class ScanStream:
                 "certain; check what leans on the hammer, its conditioner and its cable"
             )
         return f"{self._link.name}: samples arrive late for {_PROOF_TIMEOUT:g} s; close what else runs here"
-
-    def _over(self, position: Position) -> bool:
-        return bool(self._dead) or self._stretch != position.stretch
 
     def _raise_if_over(self, position: Position) -> None:
         if self._dead:

@@ -185,7 +185,10 @@ class PortAudioMicrophone:
         self._require(before + after)
         self._hear(self._samples(before), STALL)
         start = self._heard()
-        trigger = Trigger(self._blocks, self.form, start, self._baseline(start), self._threshold)
+        blocks = self._blocks.since(start - self._samples(_BASELINE_SECONDS))
+        counts = [self.form.counts(block.counts) for block in blocks if block.first < start]
+        baseline = float(np.median(np.concatenate(counts))) if counts else 0.0
+        trigger = Trigger(self._blocks, self.form, start, baseline, self._threshold)
         total = self._blocks.total
         fire()
         if not self._hear_trigger(trigger, total, timeout):
@@ -297,11 +300,6 @@ class PortAudioMicrophone:
                 now() - seconds,
             )
         )
-
-    def _baseline(self, end: int) -> float:
-        blocks = self._blocks.since(end - self._samples(_BASELINE_SECONDS))
-        counts = [self.form.counts(block.counts) for block in blocks if block.first < end]
-        return float(np.median(np.concatenate(counts))) if counts else 0.0
 
     def _readings(self, first: int, end: int, flags: int = 0) -> tuple[Reading, ...]:
         # A loss shows in the blocks that follow it, so some are awaited that are not returned.

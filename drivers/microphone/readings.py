@@ -128,15 +128,12 @@ class Trigger:
     def look(self) -> bool:
         """Whether a sample has been found; ``index`` is its number."""
         for block in self._blocks.since(self._next):
-            loud = np.flatnonzero(self._is_loud(self._form.counts(block.counts)))
+            loud = np.flatnonzero(np.abs(self._form.counts(block.counts) - self._baseline) > self._threshold)
             self._next = block.first + self._form.block
             if len(loud):
                 self.index = block.first + int(loud[0])
                 return True
         return False
-
-    def _is_loud(self, counts: AnyArray) -> AnyArray:
-        return np.asarray(np.abs(counts - self._baseline) > self._threshold)
 
 
 CRYSTAL_DRIFT = 100e-6

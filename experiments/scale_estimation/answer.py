@@ -200,7 +200,13 @@ class ScaleAnswering:
         Raises:
             WrongUse: the scene asks for no sense.
         """
-        estimators = self.with_shape() if shape_known else self.without_shape()
+        model = self.model
+        known: dict[str, Callable[[], Said]] = {
+            "vision": lambda: by_sight(model.view, self._seen(), model.nominal, model.sizes),
+            "audio": self._by_sound,
+            "touch": self._by_touch,
+        }
+        estimators = known if shape_known else self.without_shape()
         sensors = self.run.scene.sensors
         wanted = {"vision": sensors.camera, "audio": sensors.sound, "touch": sensors.touch}
         found: dict[str, Said | FitRefused] = {}
@@ -213,14 +219,12 @@ class ScaleAnswering:
         if not found:
             raise WrongUse("the scene asks for no sense; set sensors.camera, sensors.sound or sensors.touch")
         beliefs = {sense: one.belief for sense, one in found.items() if not isinstance(one, FitRefused)}
-        together = self._together(beliefs, shape_known)
+        if not beliefs:
+            together = Belief.ignorant(model.sizes)
+        else:
+            together = fused(list(beliefs.values())) if shape_known else together_without_shape(beliefs)
         usable = sum(not strike.fault for strike in self.strikes)
         return SizeAnswer(found, together, seconds, len(self.patches), usable)
-
-    def _together(self, beliefs: Mapping[str, Belief], shape_known: bool) -> Belief:
-        if not beliefs:
-            return Belief.ignorant(self.model.sizes)
-        return fused(list(beliefs.values())) if shape_known else together_without_shape(beliefs)
 
     def peaks(self) -> Peaks | None:
         """The resonances of all strikes so far; None where none was made, or none may be used."""
@@ -241,13 +245,6 @@ class ScaleAnswering:
             return refusal
         except MeshRefused as refusal:
             return FitRefused(str(refusal))
-
-    def _by_sight(self) -> Sight:
-        return by_sight(self.model.view, self._seen(), self.model.nominal, self.model.sizes)
-
-    def with_shape(self) -> dict[str, Callable[[], Said]]:
-        """How each sense answers of an object whose shape is the scene's mesh."""
-        return {"vision": self._by_sight, "audio": self._by_sound, "touch": self._by_touch}
 
     def without_shape(self) -> dict[str, Callable[[], Said]]:
         """How each sense answers of an object whose shape nobody knows.

@@ -263,7 +263,10 @@ class ShapeExplorer:
         evidence = self._readings.evidence()
         here = Surroundings(self._run.scene, self._run.station, self.travels, self._nothing, self._joints)
         estimate = None if self._settings.choose == "random" else self._shape.after(evidence)
-        lines = np.concatenate([self._towards_surface(estimate, random), self._blind(here, random)])
+        towards = np.zeros((0, 4, 4))
+        if estimate is not None:
+            towards = lines_at_surface(estimate, self._run.station.gel.sensor, DRAWN, random)
+        lines = np.concatenate([towards, self._blind(here, random)])
         scores = CHOOSERS[self._settings.choose](evidence, estimate, lines)
         best = np.argsort(-scores, kind="stable")[:LINES]
         return contact_along(
@@ -277,11 +280,6 @@ class ShapeExplorer:
             if record.step.kind == "press":
                 self._joints = end_of(record.step.parameters)
         self._read = index
-
-    def _towards_surface(self, estimate: ShapeEstimate | None, random: np.random.Generator) -> FloatArray:
-        if estimate is None:
-            return np.zeros((0, 4, 4))
-        return lines_at_surface(estimate, self._run.station.gel.sensor, DRAWN, random)
 
     def _blind(self, here: Surroundings, random: np.random.Generator) -> FloatArray:
         """``(n, 4, 4)`` in ``stand``: to what was seen, or to where the object should be."""

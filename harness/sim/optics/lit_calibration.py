@@ -47,10 +47,6 @@ LIGHT_POWERS = tuple((a, b) for a in range(LIGHT_DEGREE + 1) for b in range(LIGH
 """Of the normal's x and y, in the light's terms; the first is the constant one."""
 
 
-def _not_said() -> Float32Array:
-    return np.empty((0, 0, 3), np.float32)
-
-
 @dataclass(frozen=True, eq=False)
 class LitCalibration(TactileCalibration):
     """A calibration with the light of a press."""
@@ -58,7 +54,7 @@ class LitCalibration(TactileCalibration):
     lit: FloatArray
     """``(156, 3)``: 120 coefficients of slopes as in ``smooth``, then six of the position for each of
     ``LIGHT_POWERS``, in grey levels a metre of indentation."""
-    uncertainty: Float32Array = field(default_factory=_not_said, kw_only=True)
+    uncertainty: Float32Array = field(default_factory=lambda: np.empty((0, 0, 3), np.float32), kw_only=True)
     """``(bins, bins, 3)`` grey levels, the standard error of each colour of ``table``
     (``calibration.taxim.table``); ``(0, 0, 3)`` in files that do not say it."""
 
