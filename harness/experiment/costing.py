@@ -139,10 +139,10 @@ def _point_json(point: Point) -> JsonObject:
     }
 
 
-def gathered(
+def gather_curve(
     experiment: AnyExperiment, points: Sequence[Point], title: str, notes: Sequence[str] = ()
 ) -> Curve:
-    """One curve of the points of many runs."""
+    """Merge the points of many runs into one curve."""
     merged: dict[tuple[object, ...], tuple[Point, dict[str, Sample]]] = {}
     for point in points:
         key = tuple(sorted(point.levels.items())), tuple(sorted(point.condition.items()))
@@ -160,9 +160,9 @@ def gathered(
     )
 
 
-def joined(experiment: AnyExperiment, old: Curve, new: Curve) -> Curve:
-    """The new measurements beside the old ones of the same machine and code; the new ones win."""
-    merged = gathered(experiment, [*new.points, *old.points], new.title)
+def join_curves(experiment: AnyExperiment, old: Curve, new: Curve) -> Curve:
+    """Merge new measurements with old ones of the same machine and code; the new ones have priority."""
+    merged = gather_curve(experiment, [*new.points, *old.points], new.title)
     return replace(merged, made=new.made, notes=new.notes)
 
 

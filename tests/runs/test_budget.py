@@ -30,7 +30,7 @@ from harness.cost.provenance import code, machine
 from harness.effects.accuracy import Accuracy, Level
 from harness.experiment.begin import begin, require_reachable
 from harness.experiment.budget import answer_as_asked, sentences
-from harness.experiment.costing import Asked, gathered, joined, measure
+from harness.experiment.costing import Asked, gather_curve, join_curves, measure
 from harness.experiment.front import Front, doubts, foresee, front_for, staleness
 from harness.experiment.in_process import RunCell
 from harness.experiment.measuring import measurement_of
@@ -368,8 +368,8 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
     with pytest.raises(AssertionError, match="performed again"):
         measured()
     monkeypatch.undo()
-    curve = gathered(EXPERIMENT, points, "T")
-    assert len(joined(EXPERIMENT, curve, curve).points) == 4
+    curve = gather_curve(EXPERIMENT, points, "T")
+    assert len(join_curves(EXPERIMENT, curve, curve).points) == 4
 
 
 @pytest.mark.slow  # a measurement of a whole run; its parts stay

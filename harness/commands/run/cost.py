@@ -60,7 +60,7 @@ def cost(
     from harness.bench.station_file import load_station, station_path
     from harness.cost.file import curve_path, load, save
     from harness.cost.provenance import code, machine, stale
-    from harness.experiment.costing import gathered, joined, measure
+    from harness.experiment.costing import gather_curve, join_curves, measure
     from harness.experiment.lookup import named
     from harness.experiment.measuring import measurement_of
     from harness.report.cost_page import write_cost_page
@@ -85,14 +85,14 @@ def cost(
     if not points:
         raise DataRefused("no run could be performed; the reasons stand above")
     title = f"What {kind.title[:1].lower()}{kind.title[1:]} costs"
-    curve = gathered(kind, points, title, measured.notes())
+    curve = gather_curve(kind, points, title, measured.notes())
     path = curve_path(kind.name)
     make_folder(path.parent)
     with hold_briefly(path.with_suffix(".lock")):  # another measurement may join its points meanwhile
         if path.exists():
             old = load(path)
             if not stale(old, machine(), code(measured.estimator)):
-                curve = joined(kind, old, curve)
+                curve = join_curves(kind, old, curve)
         save(curve, path)
     save(curve, out / "curve.json")
     styled = tuple(knob.name for knob in kind.own_knobs if knob.kind == "method")  # marks differ by these
