@@ -35,10 +35,6 @@ class Fault:
 def parse(cue: Mapping[str, object], kinds: Mapping[str, tuple[str, ...]]) -> Fault:
     """Read a cue.
 
-    Args:
-        cue: as JSON.
-        kinds: of faults that each instrument takes.
-
     Raises:
         WrongUse: an unknown key, instrument or kind, or a duration that is not above zero.
     """

@@ -138,12 +138,7 @@ _ORPHAN_CHECK = 0.5
 
 
 class Lab:
-    """The far ends of the instruments and what they are told.
-
-    Args:
-        bench: what they share.
-        truth: where the truth is written.
-    """
+    """The far ends of the instruments and what they are told."""
 
     def __init__(self, bench: LabBench, truth: TruthFile) -> None:
         self._bench = bench

@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from calibration.taxim.pictures import Channels
     from harness.recording.recording import Recording
 
-_SAME_SHAPE = 0.02
-"""Relative difference of the reductions along both sides, by rounding to whole pixels."""
-
 
 def taxim(
     folder: Annotated[

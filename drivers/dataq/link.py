@@ -29,12 +29,7 @@ class LinkCut(BenchFault):
 
 
 class DataqLink:
-    """One open serial port.
-
-    Args:
-        name: of the instrument, as messages call it.
-        port: path of the device file.
-    """
+    """One open serial port."""
 
     def __init__(self, name: str, port: str) -> None:
         self.name = name

@@ -62,12 +62,7 @@ class Format:
 
 
 class Blocks:
-    """The newest blocks of a stream; filled by the sound library's thread, read by any.
-
-    Args:
-        capacity: how many blocks are kept.
-        size: samples in a block.
-    """
+    """The newest blocks of a stream; filled by the sound library's thread, read by any."""
 
     def __init__(self, capacity: int, size: int) -> None:
         self._kept: deque[Block] = deque(maxlen=capacity)
@@ -107,15 +102,7 @@ class Blocks:
 
 
 class Trigger:
-    """The first sample further than a threshold from the baseline, looked for block by block.
-
-    Args:
-        blocks: of the stream.
-        form: of their bytes.
-        start: sample number from which to look.
-        baseline: counts.
-        threshold: counts.
-    """
+    """The first sample further than a threshold from the baseline, looked for block by block."""
 
     def __init__(self, blocks: Blocks, form: Format, start: int, baseline: float, threshold: int) -> None:
         self.index = start  #: number of the sample found; ``start`` until then.

@@ -92,10 +92,6 @@ def require_mock(address: str, serial: str) -> None:
 
     A relay or a tunnel on this computer answers for an arm elsewhere.
 
-    Args:
-        address: where it answers.
-        serial: as its dashboard states it.
-
     Raises:
         SafetyStop: ``serial`` is not of the kind that only mocks have.
     """

@@ -122,7 +122,6 @@ RUNTIME_STATES: Final = {
     4: "paused",
     5: "resuming",
 }
-RUNNING: Final = 7
 PLAYING: Final = 2
 PAUSED: Final = frozenset({3, 4})
 ENDED: Final = frozenset({0, 1, 3, 4})

@@ -96,12 +96,7 @@ class SizeAnswer:
 
 @dataclass(eq=False)
 class ScaleAnswering:
-    """Readings to answer: each step's pictures, contact and strike are read once.
-
-    Args:
-        run: the folder.
-        accuracy: of the estimators.
-    """
+    """Readings to answer: each step's pictures, contact and strike are read once."""
 
     run: RunFiles
     accuracy: Accuracy

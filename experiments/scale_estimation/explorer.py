@@ -123,11 +123,7 @@ _LOW = 0.8
 
 
 class Explorer:
-    """Plans a run's contacts one at a time.
-
-    Args:
-        run: the folder.
-    """
+    """Plans a run's contacts one at a time."""
 
     def __init__(self, run: RunFiles) -> None:
         self._run = run
@@ -161,10 +157,6 @@ class Explorer:
 
     def plan(self, recording: Recording, index: int) -> dict[str, Any]:
         """The parameters of a contact.
-
-        Args:
-            recording: that holds all steps before it.
-            index: of its step.
 
         Raises:
             WrongUse: no free way was found to any place; nothing was moved.

@@ -30,11 +30,7 @@ HOUSING_DEPTH = 0.12
 
 @dataclass(eq=False)
 class ShapeReadings:
-    """What the steps read so far say; each step is read once.
-
-    Args:
-        run: the folder.
-    """
+    """What the steps read so far say; each step is read once."""
 
     run: RunFiles
     touches: list[GuardedTouch] = field(default_factory=list, init=False)
@@ -84,12 +80,7 @@ class ShapeAnswer:
 
 @dataclass(eq=False)
 class ShapeAnswering:
-    """Readings to answer: each step's pictures are read once.
-
-    Args:
-        run: the folder.
-        accuracy: says by which method.
-    """
+    """Readings to answer: each step's pictures are read once."""
 
     run: RunFiles
     accuracy: Accuracy

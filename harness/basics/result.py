@@ -62,10 +62,6 @@ def text_columns(result: Result) -> dict[str, list[str]]:
     }
 
 
-Leaves = Iterator[tuple[tuple[str, ...], Mapping[str, Any]]]
-"""The innermost mappings of nested ones, each with its path of keys."""
-
-
 def text_tables(result: Result) -> Iterator[tuple[str, list[str], list[list[str]]]]:
     """Yield title, headings and rows of every field that maps names to mappings, such as errors by method."""
     for name, value in _shown(result):

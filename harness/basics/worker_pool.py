@@ -13,11 +13,7 @@ PERIOD = 0.5
 
 
 def worker_pool(workers: int) -> ProcessPoolExecutor:
-    """A pool of fresh processes that each end themselves when their parent is gone.
-
-    Args:
-        workers: how many.
-    """
+    """A pool of fresh processes that each end themselves when their parent is gone."""
     spawn = get_context("spawn")  # threads of compiled kernels do not survive a fork
     return ProcessPoolExecutor(
         workers, mp_context=spawn, initializer=end_without_parent, initargs=(os.getpid(),)

@@ -183,14 +183,7 @@ def _raise_together(failures: Mapping[str, TouchstoneError]) -> None:
 def _wired(
     stack: ExitStack, station: Station, scene: SceneFile, run: RunContext
 ) -> tuple[Station, MockLab | None]:
-    """The station with the addresses of its instruments, and the lab behind a mocked one.
-
-    Args:
-        stack: ends the lab.
-        station: to open.
-        scene: what a mocked world shows.
-        run: what the lab is for.
-    """
+    """The station with the addresses of its instruments, and the lab behind a mocked one."""
     if station.mock is None:
         return station, None
     gap = gap_path(run.gap or station.mock.gap)

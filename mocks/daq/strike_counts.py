@@ -104,10 +104,6 @@ class StrikesOnBox:
     A record takes longer to compute than a block lasts, so it is computed beside the box's loop, and begins
     with the next block after that. What it holds in front of the blow is the hammer's flight, which is quiet,
     and a little more of that changes nothing. A record that is still being played is broken off.
-
-    Args:
-        strikes: of the run.
-        firing: the newest firing.
     """
 
     def __init__(self, strikes: StrikeCounts, firing: Callable[[], Firing]) -> None:

@@ -380,10 +380,6 @@ class Wire:
 class PluggedCard:
     """A sound card, playing, with the station's microphone on it; a ``FarEnd``.
 
-    Args:
-        station: with a microphone of its own.
-        folder: in which the card makes its own.
-
     Raises:
         BenchFault: no sound card can be mocked on this computer, and why.
         WrongUse: the station's microphone is on the hammer's box, or there is no hammer.

@@ -38,12 +38,7 @@ _LATE = b"!"
 
 
 class Queue:
-    """Samples that wait to be played.
-
-    Args:
-        rate: samples a second.
-        channels: interleaved.
-    """
+    """Samples that wait to be played."""
 
     def __init__(self, rate: int, channels: int) -> None:
         self._rate = rate

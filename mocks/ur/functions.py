@@ -39,12 +39,7 @@ Cycles = Generator[None, None, None]
 
 
 class Functions:
-    """The functions of one controller: every public method but ``table`` is one, by its own name.
-
-    Args:
-        robot: whose.
-        protective_stop: stops the arm.
-    """
+    """The functions of one controller: every public method but ``table`` is one, by its own name."""
 
     def __init__(self, robot: Robot, protective_stop: Callable[[str], None]) -> None:
         self._robot = robot

@@ -250,11 +250,7 @@ class Payload:
 
 
 class Robot:
-    """The state of one controller; it does nothing by itself.
-
-    Args:
-        config: of the controller.
-    """
+    """The state of one controller; it does nothing by itself."""
 
     def __init__(self, config: ControllerConfig) -> None:
         self.config = config

@@ -104,12 +104,7 @@ class ContactDraw:
 
 
 class GapDraw:
-    """The draws of one run.
-
-    Args:
-        gap: the distributions.
-        seed: of the run, zero or more.
-    """
+    """The draws of one run."""
 
     def __init__(self, gap: Gap, seed: int) -> None:
         self.gap = gap

@@ -288,10 +288,6 @@ class HousingContact:
     """The flat face of a sensor's housing, a gel's thickness behind the gel's own, against one mesh.
 
     Its sides are not looked at: on a straight way along the gel's axis nothing meets them first.
-
-    Args:
-        mesh: of the object, in its frame.
-        sensor: the make.
     """
 
     def __init__(self, mesh: Mesh, sensor: TactileSensor) -> None:

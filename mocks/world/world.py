@@ -141,13 +141,7 @@ class Met:
 
 
 class World:
-    """The truth of one run.
-
-    Args:
-        bench: nominal.
-        gap: distributions of what differs from it.
-        seed: of the run.
-    """
+    """The truth of one run."""
 
     def __init__(self, bench: NominalBench, gap: Gap, seed: int) -> None:
         if bench.sensor.markers is not None or bench.sensor.casts_shadow:

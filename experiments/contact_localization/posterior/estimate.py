@@ -449,14 +449,7 @@ def needs_images(setting: Setting) -> bool:
 
 
 def particle_filter(search: Search, count: int, particles: int, seed: int) -> Particles:
-    """Run the filter by touch over the first ``count`` contacts.
-
-    Args:
-        search: the run.
-        count: contacts.
-        particles: how many.
-        seed: of the start and of the resampling.
-    """
+    """Run the filter by touch over the first ``count`` contacts."""
 
     def similarity(contact: int, at: IntArray, yaws: FloatArray) -> FloatArray | None:
         """Cosines between what the gel read and what it would have read at each particle."""

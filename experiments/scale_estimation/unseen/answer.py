@@ -112,11 +112,7 @@ def ways_alone(
 
 
 def together_without_shape(beliefs: Mapping[str, Belief]) -> Belief:
-    """What several senses believe together of an object whose shape is not known; of one, what it believes.
-
-    Args:
-        beliefs: by sense, one or more.
-    """
+    """Combine the beliefs of several senses about an object of unknown shape; a single one stays as it is."""
     if len(beliefs) == 1:
         return next(iter(beliefs.values()))
     return fused(

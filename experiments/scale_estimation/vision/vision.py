@@ -118,13 +118,7 @@ class OutlineProblem:
         self._weight = 1.0 / (PIXEL_SIGMA * np.sqrt(ALIKE))
 
     def fit(self, starts: FloatArray, rounds: int, fixed_size: bool = False) -> list[OutlineFit]:
-        """From ``(k, 14)`` starts down to the nearest minimum each, by damped Gauss-Newton steps.
-
-        Args:
-            starts: unknowns.
-            rounds: steps at most.
-            fixed_size: whether the size stays as it is.
-        """
+        """From ``(k, 14)`` starts down to the nearest minimum each, by damped Gauss-Newton steps."""
         here = starts.copy()
         residuals, slopes = self._residuals(here)
         cost = 0.5 * (residuals**2).sum(axis=1)
@@ -289,10 +283,6 @@ def stands_seen(view: View, outline: SeenOutline) -> tuple[SeenStand, ...]:
 
     A picture does not tell some turns apart, as those of a mug whose handle is behind it. What moves around
     the object keeps clear of all of them.
-
-    Args:
-        view: camera and object.
-        outline: of the picture.
 
     Returns:
         The best first; none at all where the outline is not this object's.

@@ -176,12 +176,7 @@ UP_TO = 0.06
 
 
 class ShapeExplorer:
-    """Plans a run's presses one at a time.
-
-    Args:
-        run: the folder.
-        method: by which the shape is estimated meanwhile.
-    """
+    """Plans a run's presses one at a time."""
 
     def __init__(self, run: RunFiles, method: str) -> None:
         self._run, self._shape = run, RunningShape(method)
@@ -250,10 +245,6 @@ class ShapeExplorer:
 
     def plan(self, recording: Recording, index: int) -> dict[str, Any]:
         """The parameters of a press along the best of some lines that has a free way.
-
-        Args:
-            recording: that holds all steps before it.
-            index: of its step.
 
         Raises:
             WrongUse: no free way was found along any of them; nothing was moved.

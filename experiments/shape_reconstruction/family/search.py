@@ -107,12 +107,7 @@ class Hypothesis:
 
 
 class FamilySearch:
-    """One search of the family for shapes that fit some readings.
-
-    Args:
-        evidence: the readings.
-        settings: amount of search.
-    """
+    """One search of the family for shapes that fit some readings."""
 
     def __init__(self, evidence: ShapeEvidence, settings: FamilySettings) -> None:
         self.settings = settings

@@ -108,13 +108,7 @@ def window_points(frame: PointFrame, eye: FloatArray) -> FloatArray:
 
 
 def window_of(look: SeenMask, frame: PointFrame, turned: CameraYaw) -> FloatArray:
-    """Resample a silhouette: ``(1, SIDE, SIDE)``, 1 where a pixel's ray hits it, 0 elsewhere.
-
-    Args:
-        look: the silhouette.
-        frame: frame of the points, in rotated coordinates.
-        turned: that rotation.
-    """
+    """Resample a silhouette: ``(1, SIDE, SIDE)``, 1 where a pixel's ray hits it, 0 elsewhere."""
     eye = turned.inward(look.stand_from_camera[:3, 3][None])[0]
     points = apply(inverse(look.stand_from_camera), turned.outward(window_points(frame, eye)))
     rows, columns = look.mask.shape

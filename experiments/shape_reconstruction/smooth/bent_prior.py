@@ -64,9 +64,6 @@ def bend_prior(evidence: ShapeEvidence) -> SmoothSurface:
 
     The signed distance of the prior's surface is the mean of a Gaussian process; contacts correct it nearby.
 
-    Args:
-        evidence: one contact or more, and a silhouette.
-
     Raises:
         FitRefused: no contact, no silhouette, or the prior does not apply to it.
         OutOfDomain: contacts, silhouette and free space leave no body.

@@ -21,9 +21,6 @@ def max_offset(evidence: ShapeEvidence) -> float:
 def require_stated_space(evidence: ShapeEvidence) -> None:
     """Refuse readings that no object of the stated size at the stated place can cause.
 
-    Args:
-        evidence: contacts and silhouette.
-
     Raises:
         FitRefused: the silhouette, or a contact, is too far from the stated place, or two contacts are
             farther apart than the stated size allows.

@@ -27,10 +27,6 @@ def require_file(path: Path, what: str, advice: str = "check the path") -> None:
 def nearest(name: str, known: Iterable[str]) -> str:
     """Suggest the known name most similar to a mistyped one, and list all known names.
 
-    Args:
-        name: the mistyped name.
-        known: every name that exists.
-
     Returns:
         ``"did you mean 'x'? (there are x, y, z)"``, or the list alone where no name is similar.
     """

@@ -259,10 +259,6 @@ def snapped(mesh: QuadraticMesh, surface: Mesh) -> QuadraticMesh:
 
     A node stays where no face of ``surface`` near it looks its way. Where a cell would be bent
     too far, its nodes go half as far, then a quarter, and at last nowhere.
-
-    Args:
-        mesh: straight.
-        surface: that it was made from.
     """
     corners = int(mesh.cells[:, :4].max()) + 1
     onto = _moved(mesh, surface, np.unique(mesh.faces[:, :3]))

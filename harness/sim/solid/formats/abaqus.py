@@ -100,11 +100,7 @@ def read_abaqus(path: Path) -> CellFile:
 
 
 class _Reader:
-    """One pass over the lines of a file.
-
-    Args:
-        path: path of the file.
-    """
+    """One pass over the lines of a file."""
 
     def __init__(self, path: Path) -> None:
         self._name = path.name

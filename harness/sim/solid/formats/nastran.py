@@ -81,11 +81,7 @@ def read_nastran(path: Path) -> CellFile:
 
 
 class _Reader:
-    """One pass over the entries of a file.
-
-    Args:
-        path: path of the file.
-    """
+    """One pass over the entries of a file."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._name = path, path.name
