@@ -228,29 +228,6 @@ def _compile(world: World, bench: NominalBench, away: FloatArray) -> None:
         world.true_contact(pose, 0)
 
 
-def _begin(arguments: argparse.Namespace) -> Lab:
-    """Build the world; the instruments are not yet started."""
-    cv2.setNumThreads(0)  # threads of the parent are lost in a fork
-    gap = load_gap(arguments.gap)
-    told = read_lab_scene(arguments.scene, GapDraw(gap, arguments.seed))
-    world = World(told.bench, gap, arguments.seed)
-    strikes = strikes_of(world, told.scene, told.station, gap, arguments.seed)
-    start = forward(told.station.arm.model, np.array(LEFT_ABOVE))
-    _compile(world, told.bench, start)
-    bench = LabBench(
-        world=world,
-        shared=SharedPose(start),
-        scene=told.scene,
-        station=told.station,
-        address=free_address(),
-        seed=arguments.seed,
-        folder=arguments.scene.parent,
-        strikes=strikes,
-    )
-    sound = None if strikes is None else strikes.sound
-    return Lab(bench, TruthFile(arguments.truth, world, arguments.seed, arguments.run, sound))
-
-
 def main() -> int:
     """Run the lab until standard input ends; the exit status."""
     parser = argparse.ArgumentParser(prog="python -m mocks.lab", description="The mocked bench.")
@@ -265,7 +242,26 @@ def main() -> int:
     parent = os.getppid()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the run's to answer; it closes our input
     try:
-        lab = _begin(arguments)
+        # Build the world; the instruments are not yet started.
+        cv2.setNumThreads(0)  # threads of the parent are lost in a fork
+        gap = load_gap(arguments.gap)
+        told = read_lab_scene(arguments.scene, GapDraw(gap, arguments.seed))
+        world = World(told.bench, gap, arguments.seed)
+        strikes = strikes_of(world, told.scene, told.station, gap, arguments.seed)
+        start = forward(told.station.arm.model, np.array(LEFT_ABOVE))
+        _compile(world, told.bench, start)
+        bench = LabBench(
+            world=world,
+            shared=SharedPose(start),
+            scene=told.scene,
+            station=told.station,
+            address=free_address(),
+            seed=arguments.seed,
+            folder=arguments.scene.parent,
+            strikes=strikes,
+        )
+        sound = None if strikes is None else strikes.sound
+        lab = Lab(bench, TruthFile(arguments.truth, world, arguments.seed, arguments.run, sound))
     except TouchstoneError as error:
         _say({"ready": False, "error": str(error)})
         return error.exit_code

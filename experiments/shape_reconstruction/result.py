@@ -46,7 +46,27 @@ def result_of(scored: ScoredShape) -> dict[str, Any]:
     for sense in SENSES:
         one = answer.by_sense.get(sense, _NOT_ASKED)
         if isinstance(one, ShapeEstimate):
-            estimates[sense] = _estimate(sense, one, truth, answer.seconds[sense])
+            seconds = answer.seconds[sense]
+            errors: dict[str, Any] = dict.fromkeys(ERRORS)
+            if truth is not None:
+                error = shape_error(one.mesh, truth)
+                points = published_chamfer(one.mesh, truth)
+                values = (error.chamfer, points, error.accuracy, error.completeness, error.f_score)
+                errors = dict(zip(ERRORS, values, strict=True))
+            estimates[sense] = {
+                **errors,
+                "deviation_m": float(one.deviation.mean()),
+                "extents_m": np.ptp(one.mesh.bounds, axis=0).tolist(),
+                "touched": float((one.known_by == TOUCHED).mean()),
+                "seen": float((one.known_by == SEEN).mean()),
+                "not_bounded": list(one.not_bounded),
+                "doubtful_m": {str(index): float(off) for index, off in one.doubtful.items()},
+                "flags": list(one.flags),
+                "details": one.details(),
+                "mesh": f"{stem_of(sense)}.ply",
+                "seconds": seconds,
+                "refused": None,
+            }
             if scored.folder is not None:
                 scored.folder.mkdir(parents=True, exist_ok=True)
                 write_estimate(one, scored.folder, stem_of(sense))
@@ -68,29 +88,6 @@ def result_of(scored: ScoredShape) -> dict[str, Any]:
         "estimates": estimates,
         "seconds": sum(answer.seconds[sense] for sense in answer.by_sense),
         "warnings": _warnings(scored, answer),
-    }
-
-
-def _estimate(sense: str, found: ShapeEstimate, truth: Mesh | None, seconds: float) -> dict[str, Any]:
-    errors: dict[str, Any] = dict.fromkeys(ERRORS)
-    if truth is not None:
-        error = shape_error(found.mesh, truth)
-        points = published_chamfer(found.mesh, truth)
-        values = (error.chamfer, points, error.accuracy, error.completeness, error.f_score)
-        errors = dict(zip(ERRORS, values, strict=True))
-    return {
-        **errors,
-        "deviation_m": float(found.deviation.mean()),
-        "extents_m": np.ptp(found.mesh.bounds, axis=0).tolist(),
-        "touched": float((found.known_by == TOUCHED).mean()),
-        "seen": float((found.known_by == SEEN).mean()),
-        "not_bounded": list(found.not_bounded),
-        "doubtful_m": {str(index): float(off) for index, off in found.doubtful.items()},
-        "flags": list(found.flags),
-        "details": found.details(),
-        "mesh": f"{stem_of(sense)}.ply",
-        "seconds": seconds,
-        "refused": None,
     }
 
 

@@ -222,7 +222,21 @@ def split_long_edges(mesh: Mesh, longest: float) -> Mesh:
         if not long.any():
             return Mesh(vertices, faces)
         vertices, middles = _cut(vertices, edges, long)
-        faces = _refined(faces, long, middles)
+        # Faces cut along their long edges: into one, two, three or four.
+        count = long.sum(axis=1)
+        # Turn each face so that its first edge is a long one, and a single short one comes last.
+        first = np.where(count == 2, (np.argmin(long, axis=1) + 1) % 3, np.argmax(long, axis=1))
+        order = (first[:, None] + np.arange(3)) % 3
+        a, b, c = np.take_along_axis(faces, order, axis=1).T
+        ab, bc, ca = np.take_along_axis(middles, order, axis=1).T
+        one, two, three = count == 1, count == 2, count == 3
+        pieces = [
+            faces[count == 0],
+            _stacked(one, (a, ab, c), (ab, b, c)),
+            _stacked(two, (a, ab, c), (ab, b, bc), (ab, bc, c)),
+            _stacked(three, (a, ab, ca), (ab, b, bc), (bc, c, ca), (ab, bc, ca)),
+        ]
+        faces = np.concatenate(pieces)
 
 
 def _cut(vertices: FloatArray, edges: IntArray, long: BoolArray) -> tuple[FloatArray, IntArray]:
@@ -233,24 +247,6 @@ def _cut(vertices: FloatArray, edges: IntArray, long: BoolArray) -> tuple[FloatA
     middles[long] = len(vertices) + which.ravel()
     added = vertices[unique].mean(axis=1)
     return np.concatenate([vertices, added]), middles
-
-
-def _refined(faces: IntArray, long: BoolArray, middles: IntArray) -> IntArray:
-    """Faces cut along their long edges: into one, two, three or four."""
-    count = long.sum(axis=1)
-    # Turn each face so that its first edge is a long one, and a single short one comes last.
-    first = np.where(count == 2, (np.argmin(long, axis=1) + 1) % 3, np.argmax(long, axis=1))
-    order = (first[:, None] + np.arange(3)) % 3
-    a, b, c = np.take_along_axis(faces, order, axis=1).T
-    ab, bc, ca = np.take_along_axis(middles, order, axis=1).T
-    one, two, three = count == 1, count == 2, count == 3
-    pieces = [
-        faces[count == 0],
-        _stacked(one, (a, ab, c), (ab, b, c)),
-        _stacked(two, (a, ab, c), (ab, b, bc), (ab, bc, c)),
-        _stacked(three, (a, ab, ca), (ab, b, bc), (bc, c, ca), (ab, bc, ca)),
-    ]
-    return np.concatenate(pieces)
 
 
 def _stacked(chosen: BoolArray, *triangles: tuple[IntArray, IntArray, IntArray]) -> IntArray:

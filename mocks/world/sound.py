@@ -250,7 +250,23 @@ class WorldSound:
         """``(m,)`` Hz, true."""
         self.dampings = self._draw.dampings(instrument.dampings)  #: ``(m,)`` 1/s, true.
         self._levels = instrument.levels * self._draw.gains(len(instrument.levels))
-        self.noise = self._middling_level(gap) * 10.0 ** (-gap.sound.signal_to_noise / 20.0)
+        # Pa rms of the median over the surface of strikes along the normal, without cross terms of modes.
+        modes = self._modes
+        chosen = np.linspace(0, len(modes.points) - 1, min(_PLACES, len(modes.points))).astype(np.int64)
+        gains = np.einsum("kmd,kd->km", modes.shapes[chosen], modes.normals[chosen])
+        # Share of a half sine's impulse at each frequency; at f = 1 / (2 pulse) it tends to pi / 4.
+        turns = self.frequencies * gap.sound.pulse
+        apart = 1.0 - 4.0 * turns**2
+        near = np.abs(apart) < 1e-6
+        spectrum = np.where(near, np.pi / 4, np.abs(np.cos(np.pi * turns) / np.where(near, 1.0, apart)))
+        first = np.abs(gains * self._levels) * self._draw.nominal_impulse * spectrum
+        below = self.frequencies < 0.5 * self._rate
+        decays = 2.0 * self.dampings[below] * MIDDLING_OVER
+        powers = 0.5 * first[:, below] ** 2 @ (-np.expm1(-decays) / decays)
+        room = 1.0
+        if self._room is not None:
+            room += 10.0 ** (-gap.sound.direct_to_reverberant / 10.0)
+        self.noise = float(np.sqrt(room * np.median(powers))) * 10.0 ** (-gap.sound.signal_to_noise / 20.0)
         """Pa, deviation of the ambient noise."""
 
     @property
@@ -317,25 +333,6 @@ class WorldSound:
             return None
         level = gap.sound.direct_to_reverberant
         return room_response(self._rate, time, level, self._draw.room_seed, min(time, LISTEN))
-
-    def _middling_level(self, gap: Gap) -> float:
-        """Pa rms of the median over the surface of strikes along the normal, without cross terms of modes."""
-        modes = self._modes
-        chosen = np.linspace(0, len(modes.points) - 1, min(_PLACES, len(modes.points))).astype(np.int64)
-        gains = np.einsum("kmd,kd->km", modes.shapes[chosen], modes.normals[chosen])
-        # Share of a half sine's impulse at each frequency; at f = 1 / (2 pulse) it tends to pi / 4.
-        turns = self.frequencies * gap.sound.pulse
-        apart = 1.0 - 4.0 * turns**2
-        near = np.abs(apart) < 1e-6
-        spectrum = np.where(near, np.pi / 4, np.abs(np.cos(np.pi * turns) / np.where(near, 1.0, apart)))
-        first = np.abs(gains * self._levels) * self._draw.nominal_impulse * spectrum
-        below = self.frequencies < 0.5 * self._rate
-        decays = 2.0 * self.dampings[below] * MIDDLING_OVER
-        powers = 0.5 * first[:, below] ** 2 @ (-np.expm1(-decays) / decays)
-        room = 1.0
-        if self._room is not None:
-            room += 10.0 ** (-gap.sound.direct_to_reverberant / 10.0)
-        return float(np.sqrt(room * np.median(powers)))
 
 
 def _half_sine(times: FloatArray, length: float, impulse: float) -> FloatArray:

@@ -76,7 +76,18 @@ class WorldGel:
         self.calibration = named_calibration(calibration)  #: whose colours this gel has.
         require_own(self.calibration, sensor)
         self._steeper = steeper
-        self._skirt = _skirt_of(gap.skirt, sensor.pitch)
+        # Return Taxim's pyramid of blurs, each half as wide as the one before: ``blur`` m in all.
+        wanted = gap.skirt / sensor.pitch
+        pyramids: list[tuple[float, tuple[int, ...]]] = []
+        for widest in range(_NARROWEST, _WIDEST + 1, 2):
+            kernels = [widest]
+            while kernels[-1] // 2 | 1 >= _NARROWEST:
+                kernels.append(kernels[-1] // 2 | 1)
+            # Variances of blurs in a row add up.
+            halves = [half_kernel(kernel) for kernel in (*kernels, R15_SKIRT.final)]
+            variance = sum(2.0 * np.sum(half * np.arange(len(half)) ** 2) for half in halves)
+            pyramids.append((abs(float(np.sqrt(variance)) - wanted), tuple(kernels)))
+        self._skirt = GelSkirt(min(pyramids)[1], R15_SKIRT.final, R15_SKIRT.core)
         self._optics = Optics(self.calibration, "exact", -rest_surface(sensor))
         self.background: ByteArray = self.calibration.background
         """``(rows, columns, 3)``, the picture of the untouched gel."""
@@ -97,21 +108,6 @@ class WorldGel:
             deformed = self._steeper * deformed
         image: ByteArray = self._optics.render(deformed).images[0]
         return image
-
-
-def _skirt_of(blur: float, pitch: float) -> GelSkirt:
-    """Return Taxim's pyramid of blurs, each half as wide as the one before: ``blur`` m in all."""
-    wanted = blur / pitch
-    pyramids: list[tuple[float, tuple[int, ...]]] = []
-    for widest in range(_NARROWEST, _WIDEST + 1, 2):
-        kernels = [widest]
-        while kernels[-1] // 2 | 1 >= _NARROWEST:
-            kernels.append(kernels[-1] // 2 | 1)
-        # Variances of blurs in a row add up.
-        halves = [half_kernel(kernel) for kernel in (*kernels, R15_SKIRT.final)]
-        variance = sum(2.0 * np.sum(half * np.arange(len(half)) ** 2) for half in halves)
-        pyramids.append((abs(float(np.sqrt(variance)) - wanted), tuple(kernels)))
-    return GelSkirt(min(pyramids)[1], R15_SKIRT.final, R15_SKIRT.core)
 
 
 BED_MODULUS = 1.5e7

@@ -230,24 +230,7 @@ def by_sight(view: View, outline: SeenOutline, nominal: float, sizes: SizeRange)
     begun = sorted(problem.fit(_starts(view, outline, _FIRST_TURNS), _FIRST_ROUNDS), key=lambda fit: fit.cost)
     fits = problem.fit(np.array([fit.unknowns for fit in begun[:_FOLLOWED]]), _ROUNDS)
     best = min(fits, key=lambda fit: fit.cost)
-    _require_same(view, best)
-    log_nominal = np.log(nominal)
-    density = np.full(len(sizes.logs), -np.inf)
-    separate: list[OutlineFit] = []  # minima to scan, one per position and rotation
-    for fit in sorted(fits, key=lambda fit: fit.cost):
-        new = all(abs(fit.unknowns[0] - one.unknowns[0]) > 2e-3 for one in separate)
-        if fit.cost < best.cost + _FAR and new and len(separate) < _MOST_MODES:
-            separate.append(fit)
-            density = np.logaddexp(density, _scanned(problem, fit, sizes.logs - log_nominal))
-    return Sight(add_unevenness(Belief.of(sizes, density)), best, time.perf_counter() - began)
-
-
-def _require_same(view: View, best: OutlineFit) -> None:
-    """Refuse an outline that is another object's.
-
-    Raises:
-        FitRefused: at no size and turn, and with nothing far from what is stated, is it this object's.
-    """
+    # Refuse an outline that is another object's.
     if best.rms > MISFIT:
         raise FitRefused(
             f"the outline in the picture is {best.rms:.1f} px (rms) off this object's at any size and turn "
@@ -261,6 +244,15 @@ def _require_same(view: View, best: OutlineFit) -> None:
             "standard deviations off what is stated; check that it is this object, upright, and that the "
             "camera is where the station states"
         )
+    log_nominal = np.log(nominal)
+    density = np.full(len(sizes.logs), -np.inf)
+    separate: list[OutlineFit] = []  # minima to scan, one per position and rotation
+    for fit in sorted(fits, key=lambda fit: fit.cost):
+        new = all(abs(fit.unknowns[0] - one.unknowns[0]) > 2e-3 for one in separate)
+        if fit.cost < best.cost + _FAR and new and len(separate) < _MOST_MODES:
+            separate.append(fit)
+            density = np.logaddexp(density, _scanned(problem, fit, sizes.logs - log_nominal))
+    return Sight(add_unevenness(Belief.of(sizes, density)), best, time.perf_counter() - began)
 
 
 @dataclass(frozen=True, eq=False)

@@ -84,7 +84,20 @@ def bend_prior(evidence: ShapeEvidence) -> SmoothSurface:
     bent = field[near] + _covariance(places[near], data.points) @ weights
     values[near] = np.maximum(bent, _outside(evidence, silhouette, places[near]))
     body = grid.surface(values, whole.points)
-    left_out = _left_out(data, len(evidence.contacts))
+    contacts = len(evidence.contacts)
+    covariance = _covariance(data.points, data.points) + np.diag(data.sigmas**2)
+    left_out = np.zeros(contacts)
+    for fold in folds_of(contacts):
+        out = np.isin(data.touches, fold)
+        predicted = np.zeros(int(out.sum()))
+        if not out.all():
+            solved = cho_solve(cho_factor(covariance[np.ix_(~out, ~out)]), data.residuals[~out])
+            predicted = covariance[np.ix_(out, ~out)] @ solved
+        errors, surface = data.residuals[out] - predicted, data.on_surface[out] == 1
+        for contact in fold:
+            own = surface & (data.touches[out] == contact)
+            # Thinning leaves nothing of a contact that lies on another: that one predicts it.
+            left_out[contact] = float(np.sqrt(np.mean(errors[own] ** 2))) if own.any() else 0.0
     known, sides = known_by(body.mesh, whole, silhouette), limited_sides(body.mesh, whole, silhouette)
     between = _covariance(body.mesh.vertices, data.points)
     explained = np.einsum("ij,ji->i", between, cho_solve(precision, between.T)) / AMPLITUDE**2
@@ -141,21 +154,3 @@ def _outside(evidence: ShapeEvidence, silhouette: Silhouette, places: FloatArray
     """``(n,)`` m by which places are outside the visual hull, below the support or in the sensor's path."""
     outside = np.maximum(silhouette.outside_metres(places) - _SILHOUETTE, -places[:, 2])
     return np.asarray(np.maximum(outside, sensor_depth(evidence, places) - CLEARANCE))
-
-
-def _left_out(data: _Data, contacts: int) -> FloatArray:
-    """``(contacts,)`` m rms by which each contact is off the surface that is bent to the others."""
-    covariance = _covariance(data.points, data.points) + np.diag(data.sigmas**2)
-    found = np.zeros(contacts)
-    for fold in folds_of(contacts):
-        out = np.isin(data.touches, fold)
-        predicted = np.zeros(int(out.sum()))
-        if not out.all():
-            solved = cho_solve(cho_factor(covariance[np.ix_(~out, ~out)]), data.residuals[~out])
-            predicted = covariance[np.ix_(out, ~out)] @ solved
-        errors, surface = data.residuals[out] - predicted, data.on_surface[out] == 1
-        for contact in fold:
-            own = surface & (data.touches[out] == contact)
-            # Thinning leaves nothing of a contact that lies on another: that one predicts it.
-            found[contact] = float(np.sqrt(np.mean(errors[own] ** 2))) if own.any() else 0.0
-    return found

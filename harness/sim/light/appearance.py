@@ -45,9 +45,6 @@ class Appearance:
                     f"give finite {(count, *shape)}"
                 )
             object.__setattr__(self, name, read_only(given))
-        self._check_colours()
-
-    def _check_colours(self) -> None:
         if self.tints.size and not (self.tints.min() >= 0.0 and self.tints.max() <= 1.0):
             raise DataRefused(
                 f"tints are from {self.tints.min():g} to {self.tints.max():g}; a surface reflects 0 to 1"

@@ -242,7 +242,21 @@ def read_press(
         PictureRefused: not what the calibration was made of, or deeper than the gel.
         CalibrationRefused: a calibration with no smooth model, or a table of too few bins.
     """
-    _check(frames, background, calibration)
+    wanted = calibration.background.shape
+    if frames.ndim != 4 or len(frames) == 0 or frames.dtype != np.uint8 or frames.shape[1:] != wanted:
+        described = f"{frames.dtype} {frames.shape}"
+        if frames.ndim == 4 and frames.dtype == np.uint8 and frames.shape[3] == 3:
+            described = f"{len(frames)} of {frames.shape[2]} x {frames.shape[1]} pixels"
+        raise DataRefused(
+            f"the frames are {described}; this calibration reads at least one of "
+            f"{wanted[1]} x {wanted[0]} pixels in 8-bit colour: give the camera's own pictures, not cropped "
+            "or scaled"
+        )
+    if background is not None and background.shape != wanted:
+        raise DataRefused(
+            f"the background is {background.shape[1]} x {background.shape[0]} pixels and the calibration's "
+            f"{wanted[1]} x {wanted[0]}; give the camera's own picture, not cropped"
+        )
     require_one_press(frames)
     aspect = aspect_stated(calibration.header.made_from)
     mean = mean_picture(made_square(frames, aspect))
@@ -292,24 +306,6 @@ def _level_error(read: Inversion, agrees: bool, thickness: float | None) -> Floa
     if agrees or deepest == 0.0:
         return np.zeros(height.shape)
     return np.asarray(_SURROUNDINGS * deepest * np.minimum(1.0, height / (TOUCHED * deepest)))
-
-
-def _check(frames: ByteArray, background: ByteArray | None, calibration: TactileCalibration) -> None:
-    wanted = calibration.background.shape
-    if frames.ndim != 4 or len(frames) == 0 or frames.dtype != np.uint8 or frames.shape[1:] != wanted:
-        described = f"{frames.dtype} {frames.shape}"
-        if frames.ndim == 4 and frames.dtype == np.uint8 and frames.shape[3] == 3:
-            described = f"{len(frames)} of {frames.shape[2]} x {frames.shape[1]} pixels"
-        raise DataRefused(
-            f"the frames are {described}; this calibration reads at least one of "
-            f"{wanted[1]} x {wanted[0]} pixels in 8-bit colour: give the camera's own pictures, not cropped "
-            "or scaled"
-        )
-    if background is not None and background.shape != wanted:
-        raise DataRefused(
-            f"the background is {background.shape[1]} x {background.shape[0]} pixels and the calibration's "
-            f"{wanted[1]} x {wanted[0]}; give the camera's own picture, not cropped"
-        )
 
 
 @dataclass(frozen=True, eq=False)

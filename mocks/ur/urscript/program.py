@@ -52,7 +52,21 @@ class Tokens:
     """
 
     def __init__(self, text: str) -> None:
-        self.words = _tokens(text)
+        found: list[Token] = []
+        position, line = 0, 1
+        while position < len(text):
+            match = _TOKEN.match(text, position)
+            if match is None:
+                raise ScriptError(f"unexpected character {text[position]!r}", line)
+            kind, word = str(match.lastgroup), match.group()
+            if kind == "word" and word in KEYWORDS:
+                kind = "keyword"
+            if kind != "space":
+                found.append(Token(kind, word, line))
+            line += word.count("\n")
+            position = match.end()
+        found.append(Token("end of text", "", line))
+        self.words = found
         self.at = 0
 
     @property
@@ -448,24 +462,6 @@ def _placed(node: _Node, line: int) -> _Node:
     node.lineno = node.end_lineno = line
     node.col_offset = node.end_col_offset = 0
     return node
-
-
-def _tokens(text: str) -> list[Token]:
-    found: list[Token] = []
-    position, line = 0, 1
-    while position < len(text):
-        match = _TOKEN.match(text, position)
-        if match is None:
-            raise ScriptError(f"unexpected character {text[position]!r}", line)
-        kind, word = str(match.lastgroup), match.group()
-        if kind == "word" and word in KEYWORDS:
-            kind = "keyword"
-        if kind != "space":
-            found.append(Token(kind, word, line))
-        line += word.count("\n")
-        position = match.end()
-    found.append(Token("end of text", "", line))
-    return found
 
 
 def whole_length(text: str) -> int:
