@@ -14,6 +14,7 @@ from calibration.taxim.pictures import Pictures
 from calibration.taxim.shadow import SAMPLE_STEP
 from calibration.taxim.smooth_fit import distance
 from harness.basics.arrays import ByteArray
+from harness.experiment.report_content import Picture
 from harness.report.figures.calibration import (
     LONGER,
     bins_figure,
@@ -22,7 +23,7 @@ from harness.report.figures.calibration import (
     scores_figure,
     shadow_figure,
 )
-from harness.report.figures.figures import Album, Picture
+from harness.report.figures.figures import Album
 from harness.report.figures.tiles import DIFFERENCE_GAIN, difference, png
 from harness.report.template import write_page
 from harness.sim.gel.gel import deform

@@ -6,7 +6,7 @@ from experiments.contact_localization.accuracy.measurement import ContactMeasure
 from experiments.contact_localization.answer import PROGRAM, ContactAnswering
 from experiments.contact_localization.next_contact import ContactChooser
 from experiments.contact_localization.plan import plan
-from experiments.contact_localization.report.report import GIVES, sources, write
+from experiments.contact_localization.report.report import GIVES, create_report, sources
 from experiments.contact_localization.report.result import answer_lines, result_of
 from experiments.contact_localization.section import Localization
 from experiments.contact_localization.settings import KNOBS
@@ -44,7 +44,7 @@ EXPERIMENT = Experiment(
     lines=answer_lines,
     sources=sources,
     gives=GIVES,
-    report=write,
+    report=create_report,
     count_steps=lambda scene: scene.section(Localization).contacts,
     measurement=ContactMeasurement,
     plan_key=PLAN_KEY,

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from experiments.scale_estimation.answer import KNOBS, STARTS, ScaleAnswering
 from experiments.scale_estimation.cells import DRAWN, LOOKING, ScaleCell
 from experiments.scale_estimation.explorer import performer, plan, smallest_error, steps_of
-from experiments.scale_estimation.report import write
+from experiments.scale_estimation.report import create_report
 from experiments.scale_estimation.result import lines_of, result_of
 from experiments.scale_estimation.section import Scale
 from harness.bench.scene import SceneFile
@@ -60,7 +60,7 @@ EXPERIMENT = Experiment(
     lines=lines_of,
     sources=lambda _scored: {},  # readings are simulated at the CAD model's size only
     gives=(),
-    report=write,
+    report=create_report,
     count_steps=steps_of,
     measurement=ScaleMeasurement,
     plan_key=PLAN_KEY,

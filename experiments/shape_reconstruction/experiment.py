@@ -4,7 +4,7 @@ from experiments.shape_reconstruction.answer import ShapeAnswering
 from experiments.shape_reconstruction.cells import CHOICES, MESHES, ShapeCell
 from experiments.shape_reconstruction.explore.explorer import performer, plan, smallest_error, steps_of
 from experiments.shape_reconstruction.methods import KNOBS
-from experiments.shape_reconstruction.report import write
+from experiments.shape_reconstruction.report import create_report
 from experiments.shape_reconstruction.result import lines_of, result_of
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.experiment.experiment import Experiment
@@ -38,7 +38,7 @@ EXPERIMENT = Experiment(
     lines=lines_of,
     sources=lambda _scored: {},  # readings are simulated on an object that is known
     gives=(),
-    report=write,
+    report=create_report,
     count_steps=steps_of,
     measurement=ShapeMeasurement,
     plan_key=PLAN_KEY,

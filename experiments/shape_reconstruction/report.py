@@ -1,21 +1,34 @@
-"""The pictures of a shape reconstruction's report: the surface found, what it rests on, and the truth."""
+"""The report of a shape reconstruction: the surface, the readings that it is made from, and the truth."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from experiments.shape_reconstruction.answer import ScoredShape, ShapeAnswer
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.explore.explorer import live_estimates, live_method
-from experiments.shape_reconstruction.fits import SEEN, TOUCHED, ShapeEstimate
-from experiments.shape_reconstruction.metric import band_held, shape_error, surfaces_apart
+from experiments.shape_reconstruction.explore.explorer import get_running_shape, live_estimates, live_method
+from experiments.shape_reconstruction.fits import ShapeEstimate
+from experiments.shape_reconstruction.methods import METHOD
+from experiments.shape_reconstruction.metric import (
+    F_SCORE_WITHIN,
+    band_held,
+    shape_error,
+    surfaces_apart,
+)
 from experiments.shape_reconstruction.result import stem_of, true_surface
 from experiments.shape_reconstruction.section import ShapeRun
+from harness.basics.files.json_file import JsonObject
 from harness.basics.mesh import Mesh
-from harness.bench.device import Health
 from harness.experiment.compare import Comparison
-from harness.experiment.lookup import named
+from harness.experiment.report_content import (
+    AnswerValue,
+    CaptionedPicture,
+    Missing,
+    PageBlock,
+    PageSection,
+    RunReport,
+)
 from harness.recording.observation import IMAGE
 from harness.report.figures.figures import Album
 from harness.report.figures.shape import (
@@ -26,71 +39,110 @@ from harness.report.figures.shape import (
     strip_figure,
     surface_figure,
 )
-from harness.report.run_page import PageSection, write_run_page
 from harness.report.turned import turned_surface
-
-_NAME = "shape-reconstruction"
+from harness.report.wording import millimetres, show_estimates, show_value
 
 _SAMPLES = 2000
-"""On each surface, for an error to a tenth of a millimetre."""
+"""Samples on each surface, which determine an error to a tenth of a millimetre."""
+
+_FROM = {"fused": "from all readings", "vision": "from the camera image", "touch": "from touch"}
 
 
-def write(
-    scored: ScoredShape, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path
-) -> Path:
-    """Draw the report; the path of its page."""
-    folder.mkdir(parents=True, exist_ok=True)
-    album, truth = Album(folder), true_surface(scored.run, scored.truth)
-    answer: ShapeAnswer = scored.found
-    sections = [_surface(answer, truth, album)]
+def create_report(scored: ScoredShape, _comparison: Comparison, folder: Path) -> RunReport:
+    """Return the answer in words and numbers and the sections of the page; write their pictures.
+
+    Args:
+        scored: the run and its answer.
+        folder: folder of the page and its pictures; it exists.
+    """
+    album, truth, answer = Album(folder), true_surface(scored.run, scored.truth), scored.found
+    sections = [PageSection("The surface", _surface(answer, truth, album))]
     if answer.evidence.touches:
-        sections.append(_strip(scored, answer, truth, album))
-    figure = sections_figure(answer.fused.mesh, truth)
-    beside = "" if truth is None else ", and the true object by the same planes"
-    words = f"The surface cut by three planes through its middle{beside}."
-    sections.append(PageSection("Sections", words, album.drawing("sections", figure)))
+        sections.append(PageSection("Press by press", (_strip(scored, truth, album),)))
+    compared = "" if truth is None else ", and of the true object"
+    cut = CaptionedPicture(
+        album.drawing("sections", sections_figure(answer.fused.mesh, truth)),
+        f"Cross-sections of the surface{compared} in three planes through the centre of the surface.",
+    )
+    sections.append(PageSection("Cross-sections", (cut,)))
     if answer.evidence.look is not None:
         recording = scored.run.recording
-        records = (recording.step(index) for index in range(recording.committed))  # the look is the first
-        look = next(record for record in records if IMAGE in record.readings)
-        picture = np.asarray(np.median(look.readings[IMAGE].values, axis=0)).astype(np.uint8)
-        words = (
-            "What differs from the picture of the bare bench is taken for the object. No more of the picture "
-            "is used than this outline."
+        records = (recording.step(index) for index in range(recording.committed))  # the image is the first
+        record = next(record for record in records if IMAGE in record.readings)
+        picture = np.asarray(np.median(record.readings[IMAGE].values, axis=0)).astype(np.uint8)
+        outline = CaptionedPicture(
+            album.photograph("silhouette", mask_figure(picture, answer.evidence.look.mask)),
+            "Pixels that differ from the image of the bare bench belong to the object. Only this outline of "
+            "the image is used.",
         )
-        outline = album.photograph("silhouette", mask_figure(picture, answer.evidence.look.mask))
-        sections.append(PageSection("The silhouette", words, outline))
-    return write_run_page(named(_NAME), scored, comparison, health, folder, tuple(sections))
+        sections.append(PageSection("The silhouette", (outline,)))
+    sentence = _sentence(scored.run.scene.object.name, scored.result)
+    return RunReport(sentence, tuple(_values(scored.result)), sections, answer.seconds)
 
 
-def _surface(answer: ShapeAnswer, truth: Mesh | None, album: Album) -> PageSection:
+def _sentence(name: str, result: JsonObject) -> str:
+    sides = " x ".join(f"{1e3 * side:.0f}" for side in result["extents_m"])
+    error = result["error_m"]
+    compared = "" if error is None else f"; it is {millimetres(error, 1)} from the true surface on average"
+    return (
+        f"The {name} measures {sides} mm along x, y and z. The standard deviation of its surface is "
+        f"{millimetres(result['deviation_m'], 1)} on average{compared}."
+    )
+
+
+def _values(result: JsonObject) -> Iterator[AnswerValue]:
+    quantities = {"extents_m": "size along x, y and z", "chamfer_m": "mean distance to the true surface"}
+    yield from show_estimates(
+        result["estimates"],
+        _FROM,
+        quantities,
+        lambda estimate: f"standard deviation {millimetres(estimate['deviation_m'], 1)} on average",
+    )
+    for name, key in (
+        (f"F-score at {1e3 * F_SCORE_WITHIN:g} mm", "f_score"),
+        ("vertices under a contact", "touched"),
+        ("vertices at the border of the silhouette", "seen"),
+    ):
+        fraction = result["estimates"]["fused"][key]
+        if fraction is not None:
+            yield AnswerValue(name, f"{100.0 * fraction:.0f}", "%")
+    for name, key in (
+        ("presses", "presses"),
+        ("contacts", "contacts"),
+        ("presses that repeat an earlier one", "repeated"),
+        ("presses that the sensor's housing ended", "ended_by_housing"),
+    ):
+        yield show_value(name, key, result[key])
+
+
+def _surface(answer: ShapeAnswer, truth: Mesh | None, album: Album) -> tuple[PageBlock, ...]:
     found, evidence = answer.fused, answer.evidence
     shown = _shown(found, evidence)
-    ended, met = len(evidence.ended_by_housing), len(evidence.contacts)
-    nothing = len(evidence.distinct) - met - ended
-    touched, seen = (100.0 * float((found.known_by == source).mean()) for source in (TOUCHED, SEEN))
-    held = ""
-    if truth is not None:
-        apart = surfaces_apart(found.mesh, truth, _SAMPLES)
-        held = (
-            f"It is {1e3 * apart.error.chamfer:.1f} mm off the truth on average, which only a mocked run "
-            f"knows; {100.0 * band_held(found, apart).truth:.0f} % of the true surface lie within its 90 % "
-            "band. "
-        )
-    words = (
-        f"By all readings: {met} contact{'' if met == 1 else 's'} (white); dotted, {ended} "
-        f"way{'' if ended == 1 else 's'} that the sensor's housing ended, and {nothing} that met nothing. "
-        f"Of its vertices {touched:.0f} % lie under a contact and {seen:.0f} % at the silhouette's border; "
-        "all others are supposed. The colour is one standard deviation of the surface along its normal: the "
-        f"darker, the less sure. {held}"
-        f"Beside result.json: {stem_of('fused')}.ply (deviation and source of each vertex), .obj, .glb, .npz."
+    contacts, ended = len(evidence.contacts), len(evidence.ended_by_housing)
+    nothing = len(evidence.distinct) - contacts - ended
+    caption = (
+        f"The surface from all readings: {_counted(contacts, 'contact')} (white); dotted, "
+        f"{_counted(ended, 'probe line')} that the sensor's housing ended and {nothing} without contact. "
+        "Surface that is neither under a contact nor at the border of the silhouette is predicted by the "
+        "prior. The colour is the standard deviation of the surface along its normal."
     )
-    picture = album.photograph("surface", surface_figure(shown))
-    return PageSection("The surface", words, picture, turned_surface(shown))
+    if truth is not None:
+        held = band_held(found, surfaces_apart(found.mesh, truth, _SAMPLES)).truth
+        caption += f" {100.0 * held:.0f} % of the true surface are within its 90 % band."
+    return (
+        CaptionedPicture(album.photograph("surface", surface_figure(shown)), caption),
+        turned_surface(shown),
+        f"Files next to result.json: {stem_of('fused')}.ply (standard deviation and source of each vertex), "
+        ".obj, .glb and .npz.",
+    )
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _shown(estimate: ShapeEstimate, evidence: ShapeEvidence) -> KnownSurface:
-    """A surface with the readings that it is made of."""
+    """Return a surface with the readings that it is made from."""
     touches = evidence.touches
     contacts = np.array([touch.points.mean(axis=0) for touch in touches if touch.met]).reshape(-1, 3)
     passed = []
@@ -101,24 +153,24 @@ def _shown(estimate: ShapeEstimate, evidence: ShapeEvidence) -> KnownSurface:
     return KnownSurface(estimate.mesh, estimate.deviation, contacts, passed)
 
 
-def _strip(scored: ScoredShape, answer: ShapeAnswer, truth: Mesh | None, album: Album) -> PageSection:
-    method = live_method(scored.run.scene.section(ShapeRun).choose)
-    found = []
-    for live in live_estimates(answer.evidence, method):
-        title, estimate = f"press {live.presses}", live.estimate
+def _strip(scored: ScoredShape, truth: Mesh | None, album: Album) -> CaptionedPicture:
+    answer, method = scored.found, live_method(scored.run.scene.section(ShapeRun).choose)
+    last = answer.fused if scored.accuracy[METHOD.name] == method else None
+    shown = []
+    for evidence, estimate in live_estimates(answer.evidence, get_running_shape(scored.run, method), last):
+        title = f"press {len(evidence.touches)}"
         if estimate is None:
-            found.append(SurfaceThen(title, "not enough for a surface", None))
+            shown.append(SurfaceThen(title, "not enough for a surface", None))
             continue
         known = f"known to {1e3 * float(estimate.deviation.mean()):.1f} mm"
         if truth is not None:
             known += f", {1e3 * shape_error(estimate.mesh, truth, samples=_SAMPLES).chamfer:.1f} off"
-        found.append(SurfaceThen(title, known, _shown(estimate, live.evidence)))
-    seen = "presses" if answer.evidence.look is None else "the picture and all presses"
-    words = (
-        f"The surface from {seen} until then, by the method that the arm waits for ({method}): how well it "
-        "is stated to be known, and how far off the truth it is, which only a mocked run knows; means in mm. "
-        "Contacts are white; colours are of one scale."
+        shown.append(SurfaceThen(title, known, _shown(estimate, evidence)))
+    drawn = any(one.shown is not None for one in shown)
+    readings = "presses" if answer.evidence.look is None else "the camera image and the presses"
+    return CaptionedPicture(
+        album.photograph("strip", strip_figure(shown)) if drawn else Missing("no press gave a surface"),
+        f"The surface from {readings} so far, by the method between two presses ({method}), with its mean "
+        "standard deviation and its mean distance from the truth of a mocked run, in mm. Contacts are white; "
+        "all share one colour scale.",
     )
-    if all(one.shown is None for one in found):
-        return PageSection("Press by press", f"{words} None of them said enough for a surface.")
-    return PageSection("Press by press", words, album.photograph("strip", strip_figure(found)))

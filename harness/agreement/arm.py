@@ -10,13 +10,18 @@ from harness.agreement.agreement import Residual, SenseResiduals
 from harness.agreement.place_noise import own_covariance, shared_twists
 from harness.agreement.subject import PressedContact, Subject, refusal_notes
 from harness.basics.arrays import FloatArray
-from harness.basics.geometry import rotation_from_quaternion, rotation_from_vector, transform
+from harness.basics.geometry import (
+    rotation_from_quaternion,
+    rotation_from_vector,
+    transform,
+    vector_from_rotation,
+)
+from harness.bench import kinematics
 from harness.bench.gap import BenchErrors
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 from harness.twin.bench import TwinBench
 from harness.twin.bench_of import twin_of
-from harness.twin.compare import compare_arm
 
 TABLES = 1.0e-3
 """m, one sigma along each axis: a controller's own calibrated tables against the maker's printed ones."""
@@ -71,10 +76,29 @@ def joint_residual(run: RunFiles, record: StepRecord) -> Residual | None:
     count = min(len(joints), len(poses))
     chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_POSES)).astype(np.int64))
     stated = np.array([transform(rotation_from_quaternion(p[3:]), p[:3]) for p in poses[chosen]])
-    found = compare_arm(run.station.arm.model, joints[chosen], stated)
-    apart = float(found.distances.max())
-    numbers = {"apart_m": apart, "turned_rad": float(found.angles.max()), "sigma_m": TABLES}
+    distances, angles = compare_arm(run.station.arm.model, joints[chosen], stated)
+    apart = float(distances.max())
+    numbers = {"apart_m": apart, "turned_rad": float(angles.max()), "sigma_m": TABLES}
     return Residual(record.step.index, "joints", (apart / TABLES) ** 2, 3.0, numbers)
+
+
+def compare_arm(
+    model: str, joints: FloatArray, base_from_flange: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Compare a controller's flange poses with the twin's for the same joints.
+
+    Args:
+        model: model of the arm.
+        joints: ``(n, 6)`` rad, recorded.
+        base_from_flange: ``(n, 4, 4)`` poses recorded with the joints.
+
+    Returns:
+        ``(n,)`` distances in m and ``(n,)`` angles in rad.
+    """
+    expected = kinematics.forward(model, joints)
+    distances = np.linalg.norm(base_from_flange[:, :3, 3] - expected[:, :3, 3], axis=1)
+    rotations = np.swapaxes(expected[:, :3, :3], 1, 2) @ base_from_flange[:, :3, :3]
+    return distances, np.array([np.linalg.norm(vector_from_rotation(rotation)) for rotation in rotations])
 
 
 def contact_depth(

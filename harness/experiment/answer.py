@@ -40,7 +40,7 @@ OBSERVED = "observed.npz"
 
 Publish = Callable[[JsonObject], None]
 Draw = Callable[[AnyScored, Comparison, Mapping[str, Health] | None, Path], Path]
-"""Draws the report of an experiment that has no page of its own."""
+"""Writes the page of a scored run and its pictures into a folder; returns the path of the page."""
 
 
 R = TypeVar("R", bound=Answering)
@@ -106,7 +106,7 @@ def finish(
         experiment: that the run is of.
         run: folder of the run.
         accuracy: of the answer and of what is simulated.
-        draw: the report of an experiment that has no page of its own.
+        draw: writes the report.
         health: of the instruments; None for a replay.
         folder: for result and report; the run's own where None.
         answering: that has the readings already.
@@ -160,7 +160,7 @@ def add_report(
     agreement = agreement_of(scored.run, own, measured=experiment.measured)
     comparison = replace(compare(scored, experiment.sources(scored)), agreement=agreement)
     scored = replace(scored, warnings=(*scored.warnings, *comparison.notes))
-    page = (experiment.report or draw)(scored, comparison, health, folder / "report")
+    page = draw(scored, comparison, health, folder / "report")
     write_arrays(folder / OBSERVED, comparison.arrays(), compressed=True)
     plan = as_json(comparison.plan)
     for step in plan["ran"]:

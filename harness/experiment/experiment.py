@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Generic, Protocol, TypeAlias, TypeVar
 
 from harness.basics.files.json_file import JsonObject
 from harness.basics.mesh import Mesh
-from harness.bench.device import Health
 from harness.bench.scene import SceneFile, Section
 from harness.bench.station import Bench
 from harness.bench.station_file import Station
@@ -19,6 +18,7 @@ from harness.effects.accuracy import Accuracy, Knob, Level
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
 from harness.effects.quantities import Quantities
+from harness.experiment.report_content import RunReport
 from harness.experiment.truth import Truth
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import StepPerformer
@@ -137,11 +137,9 @@ class Experiment(Procedure, Generic[Readings_co, Answer_co]):
     gives: tuple[str, ...]
     """names of those sources; anything else that a scene observes is refused before anything moves, and
     without any source a scene observes nothing by default."""
-    report: (
-        Callable[[Scored[Readings_co, Answer_co], "Comparison", Mapping[str, Health] | None, Path], Path]
-        | None
-    ) = None
-    """writes the page of a scored run; None for the plain page of every experiment."""
+    report: Callable[[Scored[Readings_co, Answer_co], "Comparison", Path], RunReport] | None = None
+    """returns its part of a run's page and writes the pictures into the page's folder; None for a page with
+    the numbers of the result and without pictures."""
     count_steps: Callable[[SceneFile], int] | None = None
     """number of steps of a scene's run; None if it takes no ``--budget``."""
     measurement: "type[Measurement] | None" = None

@@ -1,7 +1,6 @@
-"""The part of a report that holds live readings beside a model of the object and beside the twin."""
+"""The part of a report that compares live readings with a model of the object and with the twin."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,70 +8,54 @@ from matplotlib.figure import Figure
 
 from harness.agreement.agreement import Agreement, SideBySide
 from harness.basics.arrays import FloatArray
-from harness.report.figures.figures import Album, Picture
+from harness.experiment.report_content import CaptionedPicture, Missing, PageBlock, Picture, ReportTable
+from harness.report.figures.figures import Album
 from harness.report.figures.style import ANSWER, SOFT, TOOL, blank, styled
-from harness.report.values import Missing
 
 _WIDTH, _HEIGHT, _TITLES = 9.6, 2.2, 0.4
 
 _SCALED = {"m": (1e3, "mm"), "Hz": (1e-3, "kHz"), "covered": (1.0, "covered")}
-"""What each unit is drawn in."""
+"""The factor and the unit that each unit is drawn in."""
 
 
-@dataclass(frozen=True)
-class AgreementRow:
-    """One sense of the table."""
-
-    sense: str  #: its name.
-    source: str  #: what it is compared with.
-    verdict: str  #: of it.
-    sentence: str  #: the residual that speaks most against the model with its numbers, or why there is none.
-    doubted: bool  #: whether it does not fit.
-
-
-@dataclass(frozen=True)
-class AgreementPart:
-    """What the part shows."""
-
-    about: str  #: the object that was compared with.
-    summary: str  #: whether all fits, or what is first in doubt.
-    rows: tuple[AgreementRow, ...]  #: one a sense.
-    picture: Picture | Missing
-    """live, model and difference of the step in doubt, or of the first; and why there is none."""
-
-
-def agreement_part(found: Agreement | Missing, album: Album) -> AgreementPart | Missing:
-    """The part of a run's page; its picture goes into the album."""
-    if isinstance(found, Missing):
-        return found
-    rows = tuple(
-        AgreementRow(
-            one.compared.sense,
-            one.compared.source,
-            one.verdict,
-            sentence,
-            one.verdict == "does not fit",
-        )
-        for one, sentence in zip(found.senses, found.sentences(), strict=True)
-    )
-    doubt = found.first_doubt
+def show_agreement(agreement: Agreement | None, album: Album) -> tuple[PageBlock, ...]:
+    """Show verdicts with their numbers, and a picture, which goes into the album."""
+    if agreement is None:
+        return (Missing("the readings were not compared with a model"),)
+    doubt = agreement.first_doubt
     if doubt is not None:
         summary = f"First in doubt: {doubt[1]}, at step {doubt[0] + 1}."
     else:
-        summary = "Everything that can be compared fits." if found.fits else "Nothing could be compared."
-    return AgreementPart(found.about, summary, rows, _picture(found, album))
+        summary = "Everything that can be compared fits." if agreement.fits else "Nothing could be compared."
+    return (
+        f"Live readings compared with a model of the {agreement.about} at the pose that the scene states, "
+        f"whatever the answer is. {summary}",
+        ReportTable(
+            ("sense", "compared with", "verdict", "largest residual"),
+            [
+                (judged.compared.sense, judged.compared.source, judged.verdict, sentence)
+                for judged, sentence in zip(agreement.senses, agreement.sentences(), strict=True)
+            ],
+            "llll",
+        ),
+        CaptionedPicture(
+            _picture(agreement, album),
+            "Live reading, model and their difference: for each sense the step in doubt, or the first step. "
+            "Resonances: live above, the model's modes below.",
+        ),
+    )
 
 
-def _picture(found: Agreement, album: Album) -> Picture | Missing:
+def _picture(agreement: Agreement, album: Album) -> Picture | Missing:
     pairs = {}
-    for one in found.senses:
+    for judged in agreement.senses:
         # The residual in doubt, or the first that has a picture.
-        with_picture = [residual for residual in one.compared.residuals if residual.sides is not None]
-        doubted = one.doubted is not None and one.doubted.sides is not None
-        residual = one.doubted if doubted else next(iter(with_picture), None)
+        with_picture = [residual for residual in judged.compared.residuals if residual.sides is not None]
+        doubted = judged.doubted is not None and judged.doubted.sides is not None
+        residual = judged.doubted if doubted else next(iter(with_picture), None)
         if residual is not None and residual.sides is not None:
-            of = f"{one.compared.sense} against the {one.compared.source}, step {residual.step + 1}"
-            verdict = "in doubt" if residual is one.doubted else one.verdict
+            of = f"{judged.compared.sense} against the {judged.compared.source}, step {residual.step + 1}"
+            verdict = "in doubt" if residual is judged.doubted else judged.verdict
             pairs[f"{of}: {residual.quantity}, {verdict}"] = residual.sides
     if not pairs:
         return Missing("no sense that was compared has a picture")

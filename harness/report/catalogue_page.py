@@ -3,7 +3,6 @@
 import base64
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,17 +24,6 @@ _SIDE = 96
 _GREY = (0.5, 0.5, 0.5)
 
 
-@dataclass(frozen=True)
-class CatalogueCard:
-    """One object on the page, in words."""
-
-    name: str
-    outcome: str
-    reason: str
-    picture: str
-    lines: tuple[str, ...]
-
-
 def write_catalogue_page(
     found: Sequence[ObjectSummary], excluded: Sequence[tuple[str, str]], catalogue: str, path: Path
 ) -> Path:
@@ -53,10 +41,7 @@ def write_catalogue_page(
         PAGE,
         catalogue=catalogue,
         counts=[f"{count} {outcome}" for outcome, count in counts.most_common()],
-        cards=[
-            CatalogueCard(each.name, each.outcome, each.reason, _picture(each), tuple(_lines(each)))
-            for each in found
-        ],
+        cards=[(each, _picture(each), _lines(each)) for each in found],
         excluded=excluded,
     )
 

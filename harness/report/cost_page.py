@@ -1,7 +1,6 @@
 """The page of a cost curve: everything inlined, PNGs of the same beside it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,34 +9,17 @@ from harness.cost.bounds import predicted_at_most
 from harness.cost.curve import Curve, Point, front
 from harness.cost.promise import MET, doubts, promises
 from harness.effects.accuracy import Level
+from harness.experiment.report_content import CaptionedPicture, PageSection, ReportTable
 from harness.report.figures.charts import contacts_chart, cost_chart
-from harness.report.figures.figures import Album, Picture
+from harness.report.figures.figures import Album
 from harness.report.template import write_page
 
 PAGE = "cost.html"
 """Name of the page in its folder."""
 
 
-@dataclass(frozen=True)
-class CostRow:
-    """One setting in words: its number on the front or "", then the cells of the table."""
-
-    number: str
-    cells: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class CostSection:
-    """One condition: its drawing and its table."""
-
-    anchor: str
-    title: str
-    picture: Picture
-    runs: int
-    rows: tuple[CostRow, ...]
-
-
-HEADINGS = (
+_HEADINGS = (
+    "front",
     "setting",
     "error",
     "median",
@@ -82,18 +64,18 @@ def write_cost_page(
             )
             said = ", ".join(map(str, rest.values()))
             curves.append((f"{said}: {point.name}", same))
-    return write_page(
-        folder / PAGE,
-        PAGE,
-        curve=curve,
-        reasons=reasons,
-        headings=HEADINGS,
-        sections=[
-            _section(curve.where(condition), condition, number, families, bool(reasons), album)
-            for number, condition in enumerate(curve.conditions(), start=1)
-        ],
-        by_count=album.drawing("cost_by_contacts", contacts_chart(curves)) if curves else None,
-    )
+    sections = [
+        _section(curve.where(condition), condition, number, families, bool(reasons), album)
+        for number, condition in enumerate(curve.conditions(), start=1)
+    ]
+    if curves:
+        caption = (
+            "Error and seconds of the settings of least error that were measured so, from the first contacts "
+            "of the same runs. Bars are 90 % bootstrap intervals."
+        )
+        by_count = CaptionedPicture(album.drawing("cost_by_contacts", contacts_chart(curves)), caption)
+        sections.append(PageSection("Number of contacts", (by_count,)))
+    return write_page(folder / PAGE, PAGE, curve=curve, reasons=reasons, sections=sections)
 
 
 def _section(
@@ -103,15 +85,21 @@ def _section(
     families: Sequence[str],
     stale: bool,
     album: Album,
-) -> CostSection:
+) -> PageSection:
     title = ", ".join(f"{name} {value}" for name, value in condition.items())
     best = front(points)
     rows = [
-        CostRow(str(best.index(point) + 1) if point in best else "", _cells(point))
+        (str(best.index(point) + 1) if point in best else "", *_cells(point))
         for point in sorted(points, key=lambda p: p.seconds.value)
     ]
     picture = album.drawing(f"cost_{number}", cost_chart(points, families, title, stale))
-    return CostSection(f"c{number}", title, picture, max(len(p.samples) for p in points), tuple(rows))
+    caption = (
+        "Error against seconds. Each mark is one setting, answered on the same "
+        f"{max(len(point.samples) for point in points)} runs. Filled and numbered: on the Pareto front, no "
+        "other setting is both cheaper and better. Hollow: dominated."
+    )
+    table = ReportTable(_HEADINGS, rows, "l" * len(_HEADINGS))
+    return PageSection(title, (CaptionedPicture(picture, caption), table))
 
 
 def _cells(point: Point) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ def write_page(path: Path, template: str, **content: Any) -> Path:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.globals["kind_of"] = lambda block: type(block).__name__
     style = environment.get_template("report.css").render()
     write_text_whole(path, environment.get_template(template).render(style=style, **content))
     return path

@@ -1,12 +1,12 @@
 """A painted surface that a page's reader turns by dragging: few faces, as base64 of small integers."""
 
 import base64
-from dataclasses import dataclass
 
 import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.mesh import Mesh
+from harness.experiment.report_content import TurnedSurface
 from harness.report.figures.shape import KnownSurface, scale_of
 from harness.report.figures.style import HEAT
 
@@ -17,16 +17,6 @@ _STEPS = 32_000
 
 _FIRST_CELL = 2.0e-3
 _WIDER = 1.2
-
-
-@dataclass(frozen=True)
-class TurnedSurface:
-    """Arrays in base64, little endian; the surface's middle is their origin, z is up."""
-
-    places: str  #: int16, three a vertex, in equal steps.
-    faces: str  #: uint16, the three vertices of each.
-    colours: str  #: uint8, red, green and blue of each vertex.
-    marks: str  #: int16, three of each contact, in the same steps.
 
 
 def turned_surface(shown: KnownSurface, most_faces: int = MOST_FACES) -> TurnedSurface:

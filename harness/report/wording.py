@@ -1,30 +1,24 @@
-"""Numbers as an operator reads them, and captions in words."""
+"""Numbers as an operator reads them, each with its unit."""
+
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
 
 from harness.basics.arrays import FloatArray
-from harness.report.data import AnswerRow, PeakLine, ReportData, SenseAnswer, Sound
-from harness.report.values import Missing
-
-SENSES = {"touch": "touch", "audio": "sound", "both": "touch and sound"}
-"""The senses by the names they have in answers, as an operator reads them."""
+from harness.basics.files.json_file import JsonObject
+from harness.experiment.report_content import COUNT, AnswerValue
 
 NONE = "\N{EN DASH}"
 """Stands where there is no number."""
 
 
 def millimetres(metres: float | None, digits: int = 2) -> str:
-    """A length with its unit, or a dash."""
+    """Format a length with its unit, or a dash."""
     return NONE if metres is None else f"{metres * 1e3:.{digits}f} mm"
 
 
-def area(square_metres: float | None) -> str:
-    """An area with the unit that suits it, or a dash."""
-    if square_metres is None:
-        return NONE
-    return f"{square_metres * 1e6:.0f} mm²" if square_metres < 1e-3 else f"{square_metres * 1e4:.0f} cm²"
-
-
 def duration(seconds: float | None) -> str:
-    """A time with the unit that suits it, or a dash."""
+    """Format a time with the unit that suits it, or a dash."""
     if seconds is None:
         return NONE
     if seconds < 1e-3:
@@ -33,90 +27,83 @@ def duration(seconds: float | None) -> str:
 
 
 def rate(hertz: float | None) -> str:
-    """A frequency with its unit, or a dash."""
+    """Format a frequency with its unit, or a dash."""
     if hertz is None:
         return NONE
     return f"{hertz:.4g} Hz" if hertz < 1e4 else f"{hertz / 1e3:.5g} kHz"
 
 
 def place(position: FloatArray) -> str:
-    """A point in millimetres."""
+    """Format a point in millimetres, without the unit."""
     x, y, z = position * 1e3
-    return f"({x:.1f}, {y:.1f}, {z:.1f}) mm"
+    return f"({x:.1f}, {y:.1f}, {z:.1f})"
 
 
-def headline(data: ReportData) -> str:
-    """The answer in one sentence."""
-    answer = data.answer
-    if isinstance(answer, Missing):
-        return f"No answer: {answer.reason}."
-    said = [f"The last contact lies at {place(answer.position)} on the {data.object_name}"]
-    if answer.error is not None:
-        said.append(f"{millimetres(answer.error)} from the truth")
-    if answer.credible90 is not None:
-        said.append(f"with 90 % certainty within {millimetres(answer.credible90, 1)}")
-    sentence = ", ".join(said) + "."
-    if answer.modes > 1:
-        sentence += f" The readings fit {answer.modes} separate places; this is the likeliest."
-    if isinstance(data.sound, Missing):
-        return sentence
-    senses = ", ".join(f"by {SENSES[sense.name]} {_nearness(sense)}" for sense in data.sound.senses)
-    return f"{sentence} {senses[:1].upper()}{senses[1:]}."
+_UNITS = {
+    "m_per_s": (1.0, "m/s"),
+    "per_s": (1.0, "1/s"),
+    "m": (1e3, "mm"),
+    "m2": (1e6, "mm²"),
+    "rad": (180.0 / np.pi, "°"),
+    "s": (1.0, "s"),
+    "hz": (1.0, "Hz"),
+    "db": (1.0, "dB"),
+    "pa": (1.0, "Pa"),
+}
+"""Units at the end of a key of JSON, each with the factor and the unit that it is shown in."""
+
+_LONGEST = 4
+"""Numbers of a list that are all shown; of a longer one its ends are."""
+
+_HASH = 12
+"""Letters of a hash that are shown."""
 
 
-def _nearness(sense: SenseAnswer) -> str:
-    if isinstance(sense.posterior, Missing):
-        return "no answer"
-    certain = f"90 % within {millimetres(sense.posterior.credible90, 1)}"
-    return certain if sense.error is None else f"{millimetres(sense.error)} off ({certain})"
+def format_key(key: str, value: object) -> tuple[str, str, str]:
+    """Format a key of JSON and its value as name, value and unit.
+
+    Args:
+        key: with its unit at the end: ``"gel_centre_m"``; dots separate the levels of a tree.
+        value: a number, a text or a list of numbers.
+    """
+    suffix = next((suffix for suffix in _UNITS if key.endswith(f"_{suffix}")), "")
+    factor, unit = _UNITS.get(suffix, (1.0, ""))
+    name = key.removesuffix(f"_{suffix}").replace(".", ": ").replace("_", " ")
+    if isinstance(value, list) and len(value) > _LONGEST:
+        return name, f"{len(value)} values, from {factor * value[0]:.4g} to {factor * value[-1]:.4g}", unit
+    if isinstance(value, list) and value:
+        scaled = factor * np.array(value, np.float64)
+        # Four digits of the greatest; adding zero removes the sign of a zero.
+        digits = 3 - int(np.floor(np.log10(max(float(np.abs(scaled).max()), 1e-12))))
+        return name, f"({', '.join(f'{number:g}' for number in np.round(scaled, digits) + 0.0)})", unit
+    if isinstance(value, float):
+        return name, f"{factor * value + 0.0:.4g}", unit
+    return name, str(value)[:_HASH] if key.endswith("sha256") else str(value), unit
 
 
-def heard(sound: Sound) -> str:
-    """What the strikes say together, in one or two sentences."""
-    counted = sum(strike.unused == "" for strike in sound.strikes)
-    said = f"{counted} of {len(sound.strikes)} strikes count"
-    if sound.band is not None:
-        said += f"; together they excite {sound.band[0] / 1e3:.1f} to {sound.band[1] / 1e3:.1f} kHz"
-    if not isinstance(sound.peaks, Missing):
-        matched = sum(bool(peak.modes) for peak in sound.peaks)
-        number = len(sound.peaks)
-        common = f"{number} {'resonance'}" + ("" if number == 1 else "s")
-        said += f". {common} in common, {matched} of them taken for modes"
-        if sound.set_aside:
-            said += f", and {sound.set_aside} more set aside as echoes or as more than one waveform"
-        side = "above" if sound.scale >= 1.0 else "below"
-        said += f". The object rings {100.0 * abs(sound.scale - 1.0):.1f} % {side} its model"
-    return said + "."
+def show_value(name: str, key: str, value: object, uncertainty: str = "") -> AnswerValue:
+    """Create a row of the answer's table from a key of the result and its value."""
+    _, number, unit = format_key(key, value)
+    return AnswerValue(name, number, unit or COUNT, uncertainty)
 
 
-def modes_of(peak: PeakLine) -> str:
-    """Numbers of the modes that a peak is taken for."""
-    if not peak.modes:
-        return "none"
-    first, last = peak.modes[0], peak.modes[-1]
-    return str(first) if first == last else f"{first} to {last}"
+def show_estimates(
+    estimates: Mapping[str, JsonObject],
+    senses: Mapping[str, str],
+    quantities: Mapping[str, str],
+    uncertainty: Callable[[JsonObject], str],
+) -> Iterator[AnswerValue]:
+    """Yield the rows of each sense's estimate in the answer's table.
 
-
-def percent(share: float | None) -> str:
-    """A signed relative difference, or a dash."""
-    return NONE if share is None else f"{100.0 * share:+.2f} %"
-
-
-def quantity(value: float | None, unit: str, digits: int = 3) -> str:
-    """A number to so many digits with its unit, or a dash."""
-    return NONE if value is None else f"{value:.{digits}g} {unit}"
-
-
-def cards(answer: AnswerRow) -> list[tuple[str, str, str]]:
-    """(what, value, remark) of the numbers that stand first."""
-    shown = [
-        ("error", millimetres(answer.error), "last contact, straight line"),
-        ("error modulo symmetry", millimetres(answer.error_symmetric), "least over the object's rotations"),
-        ("90 % radius", millimetres(answer.credible90, 1), "of the posterior about the answer"),
-        ("estimation took", duration(answer.seconds), "from readings to answer"),
-        ("mean error", millimetres(answer.error_mean), "over all contacts of the run"),
-        ("geometry alone", millimetres(answer.geometry_baseline, 1), "baseline: translations, no touch"),
-        ("random point", millimetres(answer.random_baseline, 1), "baseline: no knowledge"),
-        ("likely places", str(answer.modes), "separate modes of the posterior"),
-    ]
-    return [card for card in shown if card[1] != NONE]
+    Args:
+        estimates: estimates of a result by sense; values that are null have no row.
+        senses: names of the senses in the order of the rows.
+        quantities: names of the quantities by the key that they have in an estimate.
+        uncertainty: returns the uncertainty of an estimate's first quantity.
+    """
+    for sense, words in senses.items():
+        estimate, first = estimates.get(sense, {}), next(iter(quantities))
+        for key, name in quantities.items():
+            if estimate.get(key) is not None:
+                within = uncertainty(estimate) if key == first else ""
+                yield show_value(f"{name}, {words}", key, estimate[key], within)

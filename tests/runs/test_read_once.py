@@ -1,4 +1,4 @@
-"""Session, explorer, answer, comparison and report read each step once and solve each answer once."""
+"""Session, explorer, answer and report read each step once, solve each answer once; pages share one form."""
 
 import subprocess
 import sys
@@ -14,6 +14,7 @@ import pytest
 from experiments.contact_localization.posterior import policy
 from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.shape_reconstruction import answer as shape_answer
+from experiments.shape_reconstruction.explore import explorer
 from experiments.shape_reconstruction.methods import QUICK
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import Station
@@ -23,12 +24,14 @@ from harness.experiment.begin import begin
 from harness.experiment.experiment import Answering
 from harness.experiment.lookup import named
 from harness.experiment.perform import Performed, perform_on_bench
+from harness.experiment.report_content import COUNT
 from harness.recording import run_folder
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
 from harness.report.run_page import write_run_page
 from harness.sim.optics import inverse
+from tests.support.pages import Page
 
 SENSES: Mapping[str, Any] = {"touch": True, "camera": False, "sound": False}
 SCENES: Mapping[str, Mapping[str, Any]] = {
@@ -91,11 +94,12 @@ def count_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
     counted(run_folder, "mask_by_background", mask)
     counted(policy, "locate", localization)
     counted(ScaleAnswering, "answered", lambda *_: found.answers.update(["size"]))
-    counted(
-        shape_answer,
-        "estimated",
-        lambda _, seen: found.answers.update([(len(seen.touches), seen.look is None)]),
-    )
+    for module in (shape_answer, explorer):
+        counted(
+            module,
+            "estimated",
+            lambda _, seen: found.answers.update([(len(seen.touches), seen.look is None)]),
+        )
     return found
 
 
@@ -138,6 +142,35 @@ def test_each_picture_is_inverted_once_and_each_answer_is_solved_once(whole: Who
     assert calls.masks == len(looks)
     assert calls.answers
     assert set(calls.answers.values()) == {1}
+
+
+HEADINGS = [
+    "Answer", "Readings and estimates", "Agreement with the model", "Bench", "Cost of the answer",
+]  # fmt: skip
+BENCH = [
+    "Instruments", "Calibrations", "Simulated effects", "Differences of the mocked world", "Versions",
+]  # fmt: skip
+UNITS = {"mm", "mm²", "m/s", "%", COUNT}
+
+
+def test_pages_of_all_experiments_have_one_form(whole: Whole) -> None:
+    page = Page(Path(whole.result["report"]).read_text(encoding="utf-8"))
+    assert page.headings["h2"] == HEADINGS
+    assert len(page.headings["h3"]) > len(BENCH)
+    assert page.headings["h3"][-len(BENCH) :] == BENCH
+    rows = [row for row in page.rows["Answer"] if row]
+    assert rows
+    assert all(quantity and value for quantity, value, *_ in rows)
+    assert {unit for _, _, unit, _ in rows} <= UNITS
+    for knob in named(whole.name).knobs:
+        assert f"{knob.name} {whole.result['accuracy'][knob.name]}" in page.text
+
+
+def test_no_page_shows_python_or_lines_of_the_terminal(whole: Whole) -> None:
+    text = Page(Path(whole.result["report"]).read_text(encoding="utf-8")).text
+    for token in ("[0.", "{'", "array(", "None", "nan", "_m ", "<class", "True", "False"):
+        assert token not in text
+    assert not [line for line in named(whole.name).lines(whole.result) if line in text]
 
 
 def test_no_kernel_is_loaded_between_the_first_step_and_the_answer(whole: Whole) -> None:

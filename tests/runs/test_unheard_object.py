@@ -11,15 +11,15 @@ from experiments.contact_localization.answer import ContactAnswering
 from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.report.sound_report import sound_of
+from experiments.contact_localization.report.sound_report import gather_strikes
 from harness.basics.errors import FitRefused, MeshRefused
 from harness.basics.materials import MATERIALS
 from harness.bench.scene import scene_from_json
 from harness.experiment.answer import write_answer
 from harness.experiment.compare import compare
+from harness.experiment.report_content import Missing
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.report.values import Missing
 from harness.sim.modal import modal
 from harness.sim.modal.modes import Modes
 from tests.oracles.volume_meshes import box
@@ -69,7 +69,7 @@ def test_touch_answers_and_the_result_says_why_sound_does_not(recording: Recordi
     comparison = compare(scored, EXPERIMENT.sources(scored))
     assert set(comparison.observed()) == {"touch.image"}
     assert any(WHY in note for note in comparison.notes)
-    shown = sound_of(scored)
+    shown = gather_strikes(scored)
     assert isinstance(shown, Missing)
     assert WHY in shown.reason
 

@@ -8,12 +8,15 @@ import numpy as np
 from experiments.contact_localization.answer import Answer, ScoredContact
 from experiments.contact_localization.posterior.baselines import mean_random_error, without_images
 from experiments.contact_localization.posterior.consistency import Gate
-from experiments.contact_localization.posterior.estimate import SPACING, Estimate
+from experiments.contact_localization.posterior.estimate import SPACING, Estimate, Senses
 from experiments.contact_localization.posterior.strike_consistency import doubts_of_sound
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.mesh import Mesh
 from harness.basics.symmetry import SymmetryGroup
+
+SENSES: Mapping[Senses, str] = {"touch": "touch", "audio": "sound", "both": "touch and sound"}
+"""Names of the senses in the report."""
 
 SAME_PLACE = 3.0e-3
 """Distance of two places modulo the object's symmetry below which they are one, m."""

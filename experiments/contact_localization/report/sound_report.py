@@ -1,6 +1,6 @@
-"""What the report shows of each sense: three posteriors, the strikes, and what they were heard to say."""
+"""The section of a localization's report on its senses: posteriors, strikes, and the peaks of their sound."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +9,24 @@ from scipy.fft import rfft, rfftfreq
 from experiments.contact_localization.answer import Answer, ScoredContact
 from experiments.contact_localization.posterior.estimate import SPACING, Estimate
 from experiments.contact_localization.posterior.strikes import StrikeEvidence, hear
-from experiments.contact_localization.report.result import true_points
+from experiments.contact_localization.report.result import SENSES, true_points
+from experiments.contact_localization.sound.likelihood import ModeRow
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import FitRefused
 from harness.basics.materials import Material
 from harness.bench.acquisition import Strike
-from harness.report.data import PeakLine, SenseAnswer, Sound, SpectrogramPair, StrikeLine
-from harness.report.values import Missing, Posterior
+from harness.experiment.report_content import (
+    Bar,
+    CaptionedPicture,
+    Missing,
+    PageBlock,
+    PageSection,
+    ReportTable,
+)
+from harness.report.figures.figures import Album
+from harness.report.figures.pictures import Posterior, Sides, close_up
+from harness.report.figures.sound import senses_figure, spectrogram_pair
+from harness.report.wording import NONE, duration
 from harness.sim.modal.modes import Modes, dampings
 from harness.sim.sound.modal_sound import radiation, ring
 from harness.strikes.spectra import Analysis
@@ -23,11 +34,16 @@ from harness.strikes.spectra import Analysis
 NOT_STRUCK = "not struck"
 
 _EDGE = 0.1
-"""Of the greatest force: between its rise to this and its fall to it the hammer touches."""
+"""Fraction of the greatest force; the hammer touches between the rise to it and the fall to it."""
+
+_MIN_WIDTH = 0.03
+"""m across the close-up of the object."""
+
+_CLOSE_UP_PIXELS = 460
 
 
-def sound_of(scored: ScoredContact) -> Sound | Missing:
-    """What each sense contributed to a run's answer, or why there is nothing to show."""
+def gather_strikes(scored: ScoredContact) -> StrikeEvidence | Missing:
+    """Return the evidence of a run's strikes, or why there is none."""
     found = scored.found
     if not scored.run.scene.sensors.sound:
         return Missing("the scene called for no sound")
@@ -39,26 +55,55 @@ def sound_of(scored: ScoredContact) -> Sound | Missing:
         float(scored.accuracy[SPACING.name]),
         alone=not found.last.gates,
     )
-    if heard is None:
-        return Missing("no contact was struck")
-    evidence = heard.term.evidence
-    reasons = dict(zip(heard.struck.tolist(), evidence.reasons, strict=True))
-    return Sound(
-        senses=_senses(scored),
-        strikes=tuple(
-            strike_line(index + 1, observation.strike, reasons.get(index, NOT_STRUCK))
-            for index, observation in enumerate(found.readings.observations)
-        ),
-        pair=_pair(found, heard),
-        peaks=_peaks(found, heard),
-        set_aside=len(evidence.rejected),
-        band=evidence.band if evidence.band[1] > 0.0 else None,
-        scale=_scale(found, heard),
+    return Missing("no contact was struck") if heard is None else heard
+
+
+def show_senses(
+    scored: ScoredContact, object_from_gel: FloatArray, sides: Sides, album: Album
+) -> Iterator[PageBlock]:
+    """Show what each sense contributed to a run's answer, or why there is nothing to show.
+
+    Args:
+        scored: the run and its answer.
+        object_from_gel: ``(4, 4)`` estimated gel pose of the last contact.
+        sides: views of the object.
+        album: of the page.
+    """
+    heard = gather_strikes(scored)
+    if isinstance(heard, Missing):
+        yield heard
+        return
+    found, true = scored.found, true_points(scored)
+    truth, by_sense = None if true is None else true[-1], found.by_sense
+    # The close-up spans the area that every sense's posterior covers, and at most the object.
+    answer, mesh = found.last.position_in_object, scored.run.mesh
+    extents = [
+        one.credible90 + float(np.linalg.norm(one.position_in_object - answer))
+        for one in by_sense.values()
+        if isinstance(one, Estimate)
+    ]
+    across = min(max(_MIN_WIDTH, 3.0 * max(extents, default=0.0)), mesh.diagonal)
+    near = close_up(mesh, answer, -object_from_gel[:3, 2], across, _CLOSE_UP_PIXELS)
+    posteriors = {
+        SENSES[sense]: posterior_of(one) if isinstance(one, Estimate) else Missing(str(one))
+        for sense, one in by_sense.items()
+    }
+    yield CaptionedPicture(
+        album.photograph("senses", senses_figure((*sides.shots, near), posteriors, truth)),
+        "The posterior of the last contact after all contacts: from the tactile images, from the sound of "
+        "the strikes, and from both; first row from the side of the answer, second row from the opposite "
+        f"side, third row close up, {1e3 * across:.0f} mm across, along the tool. All three use the tool "
+        f"poses. Blue cross: the answer of the sense{'.' if truth is None else '; green star: the truth.'}",
     )
+    for sense, one in by_sense.items():
+        if isinstance(one, FitRefused):
+            yield Missing(f"no answer from {SENSES[sense]}: {one}")
+    yield PageSection("Strikes", tuple(_strikes(found, heard, album)))
+    yield PageSection("Peaks and modes", tuple(_peaks(found, heard)))
 
 
 def posterior_of(estimate: Estimate) -> Posterior:
-    """The hypotheses of an estimate's last contact, for pictures."""
+    """Return the hypotheses of an estimate's last contact, for pictures."""
     return Posterior(
         estimate.points,
         estimate.weights,
@@ -69,34 +114,52 @@ def posterior_of(estimate: Estimate) -> Posterior:
     )
 
 
-def _senses(scored: ScoredContact) -> tuple[SenseAnswer, ...]:
-    true, answers = true_points(scored), []
-    for name, found in scored.found.by_sense.items():
-        if isinstance(found, FitRefused):
-            answers.append(SenseAnswer(name, Missing(str(found))))
-            continue
-        error = None if true is None else float(np.linalg.norm(found.position_in_object - true[-1]))
-        seconds = sum(found.seconds.values())
-        answers.append(SenseAnswer(name, posterior_of(found), error, found.region.area, seconds))
-    return tuple(answers)
+def _strikes(found: Answer, heard: StrikeEvidence, album: Album) -> Iterator[PageBlock]:
+    evidence = heard.term.evidence
+    reasons = dict(zip(heard.struck.tolist(), evidence.reasons, strict=True))
+    strikes = [observation.strike for observation in found.readings.observations]
+    summary = f"{int(evidence.used.sum())} of {len(strikes)} strikes count"
+    if evidence.band[1] > 0.0:
+        low, high = 1e-3 * np.array(evidence.band)
+        summary += f"; together they excite {low:.1f} to {high:.1f} kHz"
+    yield f"{summary}."
+    rows = [
+        format_strike(index + 1, strike, reasons.get(index, NOT_STRUCK))
+        for index, strike in enumerate(strikes)
+    ]
+    headings = ("contact", "strike", "greatest force", "contact time", "greatest pressure")
+    yield ReportTable(headings, rows, "llrrr")
+    pair = pair_spectrograms(found, heard)
+    if isinstance(pair, Missing):
+        yield pair
+        return
+    contact, recorded, simulated = pair
+    figure = spectrogram_pair(recorded.times, recorded.frequencies, recorded.levels, simulated.levels)
+    yield CaptionedPicture(
+        album.photograph("spectrograms", figure),
+        f"The strike of contact {contact} as recorded, as the model rings at the estimated position under "
+        "the recorded force, and the difference. Each is relative to its own loudest. The model has neither "
+        "the room nor the microphone's noise, which remain between the lines.",
+    )
 
 
-def strike_line(contact: int, strike: Strike | None, unused: str) -> StrikeLine:
-    """One strike in numbers.
+def format_strike(contact: int, strike: Strike | None, unused: str) -> tuple[str, ...]:
+    """Return the row of a strike: greatest force, contact time and greatest pressure.
 
     Args:
         contact: from 1.
         strike: None where the contact was not struck.
         unused: why it does not count; empty where it does.
     """
+    state = f"not used: {unused}" if unused else "used"
     if strike is None or strike.silent:
-        return StrikeLine(contact, unused)
-    return StrikeLine(
-        contact,
-        unused,
-        float(strike.force.max()),
-        contact_time(strike.force, strike.rate),
-        float(np.abs(strike.pressure).max()),
+        return (str(contact), state, NONE, NONE, NONE)
+    return (
+        str(contact),
+        state,
+        f"{float(strike.force.max()):.3g} N",
+        duration(contact_time(strike.force, strike.rate)),
+        f"{float(np.abs(strike.pressure).max()):.3g} Pa",
     )
 
 
@@ -120,60 +183,106 @@ def _until(falling: FloatArray, level: float) -> float:
     return after - 1 + float(falling[after - 1] - level) / drop
 
 
-def _pair(found: Answer, heard: StrikeEvidence) -> SpectrogramPair | Missing:
+def pair_spectrograms(
+    found: Answer, heard: StrikeEvidence
+) -> tuple[int, "Spectrogram", "Spectrogram"] | Missing:
+    """Return the last contact whose strike counts, and its sound as recorded and as modelled."""
     counted = heard.struck[heard.term.evidence.used]
     if not len(counted):
         return Missing("no strike counts")
     index = int(counted[-1])
     strike, model = found.readings.observations[index].strike, found.readings.model
-    modes, material = model.modes, model.material
-    assert strike is not None
-    assert modes is not None
-    assert material is not None
-    direction = _directions(found, [index])[0]
-    factor = _scale(found, heard)
-    pair = sound_pair(strike, modes, material, found.last.contacts[index], direction, factor)
-    recorded, simulated = pair.recorded, pair.simulated
-    return SpectrogramPair(index + 1, recorded.times, recorded.frequencies, recorded.levels, simulated.levels)
+    if strike is None or model.modes is None or model.material is None:
+        return Missing("the object has no modes")
+    direction, factor = _directions(found, [index])[0], estimate_sound_scale(found, heard)
+    point = found.last.contacts[index]
+    return (index + 1, *sound_pair(strike, model.modes, model.material, point, direction, factor))
 
 
-def _scale(found: Answer, heard: StrikeEvidence) -> float:
-    """Of the object's frequencies over the model's, as the places of the answer have it."""
+def estimate_sound_scale(found: Answer, heard: StrikeEvidence) -> float:
+    """Return the ratio of the object's frequencies to the model's, most probable at the answer."""
     struck = [int(k) for k in heard.struck]
     return heard.term.scale_at(found.last.contacts[struck], _directions(found, struck))
 
 
 def _directions(found: Answer, contacts: Sequence[int]) -> FloatArray:
-    """``(K, 3)`` unit, in the object's frame: where the hammer went, under the answer's yaw."""
+    """``(K, 3)`` unit, in the object's frame: directions of the hammer, under the answer's yaw."""
     object_from_base = found.readings.prior.object_from_base(np.array([found.last.yaw]))[0]
     axes = np.array([found.readings.observations[k].base_from_gel[:3, 2] for k in contacts])
     return np.asarray(axes @ object_from_base.T)
 
 
-def _peaks(found: Answer, heard: StrikeEvidence) -> tuple[PeakLine, ...] | Missing:
+def match_peaks(found: Answer, heard: StrikeEvidence) -> tuple[ModeRow, ...] | Missing:
+    """Return the resonances that the strikes have in common, each with its modes at the answer."""
     evidence = heard.term.evidence
     if int(evidence.used.sum()) < 2:
         return Missing(
-            "fewer than two strikes count, and one alone cannot be told from the response of room and "
-            "microphone"
+            "fewer than two strikes count, and one does not separate the object from room and microphone"
         )
     if not evidence.peaks:
         return Missing("the strikes have no resonance in common")
-    rows = heard.term.mode_table(found.last.contacts[heard.struck], _directions(found, heard.struck.tolist()))
-    return tuple(
-        PeakLine(
-            frequency=row.frequency,
-            damping=row.damping,
-            residual=row.residual,
-            level=row.level,
-            modes=tuple(mode + 1 for mode in row.modes),
-            mode_frequency=row.model_frequency if row.modes else None,
-            mode_damping=row.model_damping if row.modes else None,
-            probability=row.probability,
-            nats=row.nats,
-            weight=heard.term.weight,
+    return heard.term.mode_table(found.last.contacts[heard.struck], _directions(found, heard.struck.tolist()))
+
+
+_PEAK_HEADINGS = (
+    *("peak", "level", "modes", "model", "difference", "match"),
+    *("damping", "model damping", "residual"),
+)
+
+
+def _peaks(found: Answer, heard: StrikeEvidence) -> Iterator[PageBlock]:
+    peaks, factor = match_peaks(found, heard), estimate_sound_scale(found, heard)
+    if isinstance(peaks, Missing):
+        yield peaks
+        return
+    matched, rejected = sum(bool(peak.modes) for peak in peaks), len(heard.term.evidence.rejected)
+    yield (
+        f"{len(peaks)} {'resonance' if len(peaks) == 1 else 'resonances'} in common, {matched} of them "
+        "matched to modes"
+        + (f", and {rejected} more rejected as echoes or as more than one waveform" if rejected else "")
+        + f". The object rings {100.0 * abs(factor - 1.0):.1f} % {'above' if factor >= 1.0 else 'below'} its "
+        "model."
+    )
+    yield (
+        "Each peak is shown with the modes that explain it at the answer. The log-likelihood ratio compares "
+        "it with an uninformative peak; the weight accounts for errors that neighbouring peaks share. Bars "
+        "are to scale; pale bars speak against the answer."
+    )
+    weight = heard.term.weight
+    longest = max(abs(weight * peak.nats) for peak in peaks)
+    yield ReportTable(
+        (*_PEAK_HEADINGS, "log-likelihood ratio", ""),
+        [
+            (
+                *format_peak(peak, weight),
+                Bar(100.0 * abs(weight * peak.nats) / (longest or 1.0), peak.nats < 0.0),
+            )
+            for peak in peaks
+        ],
+        "rrrrrrrrrrl",
+    )
+
+
+def format_peak(peak: ModeRow, weight: float) -> tuple[str, ...]:
+    """Return the row of a peak and of the modes that it is matched to; ``weight`` is that of its ratio."""
+    numbers = [str(mode + 1) for mode in peak.modes]
+    model = (NONE, NONE, NONE)
+    if peak.modes:
+        model = (
+            f"{peak.model_frequency:.5g} Hz",
+            f"{100.0 * (peak.frequency / peak.model_frequency - 1.0):+.2f} %",
+            f"{peak.model_damping:.3g} 1/s",
         )
-        for row in rows
+    return (
+        f"{peak.frequency:.5g} Hz",
+        f"{peak.level:.0f} dB",
+        " to ".join(dict.fromkeys((numbers[0], numbers[-1]))) if numbers else "none",
+        *model[:2],
+        f"{100 * peak.probability:.0f} %",
+        f"{peak.damping:.3g} 1/s",
+        model[2],
+        f"{100 * peak.residual:.1f} %",
+        f"{peak.nats:+.2f} at weight {weight:g}",
     )
 
 
@@ -193,14 +302,6 @@ class Spectrogram:
     frequencies: FloatArray  #: ``(f,)`` Hz.
     levels: FloatArray  #: ``(f, n)`` dB against the loudest, down to -90.
     loudest: float  #: Pa, rms of the loudest line.
-
-
-@dataclass(frozen=True, eq=False)
-class SoundPair:
-    """One strike as it was heard beside what the model says at the estimated place."""
-
-    recorded: Spectrogram
-    simulated: Spectrogram
 
 
 def spectrogram(sound: FloatArray, rate: float) -> Spectrogram:
@@ -229,8 +330,8 @@ def sound_pair(
     point: FloatArray,
     direction: FloatArray,
     factor: float,
-) -> SoundPair:
-    """A strike as recorded, and as its own force would sound at a place of the model.
+) -> tuple[Spectrogram, Spectrogram]:
+    """Return a strike as recorded, and as its own force would sound at a point of the model.
 
     Neither room nor microphone is in the simulated one, and its level at 0.3 m is an upper bound.
 
@@ -249,4 +350,4 @@ def sound_pair(
     force[round(Analysis().pulse * strike.rate) :] = 0.0
     rung = ring(frequencies, dampings(frequencies, material), amplitudes, force[None], strike.rate)[0]
     recorded = spectrogram(strike.pressure[strike.onset :], strike.rate)
-    return SoundPair(recorded, spectrogram(rung, strike.rate))
+    return recorded, spectrogram(rung, strike.rate)

@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -49,8 +50,8 @@ class RunningShape:
     """Estimates after one press more each time.
 
     By ``INFORMATIVE`` each begins at the hypotheses of that before it and at a few draws of its own, from the
-    first press on, whichever are asked for: a run that is resumed, or replayed, goes where it went. Where
-    what is found fits ill, hypotheses before it may all be of a wrong form: it is begun anew beside them.
+    first press on, whichever are requested: a run that is resumed, or replayed, goes where it went. After a
+    poor fit the hypotheses may all be of a wrong form, and the search also begins from scratch.
 
     Args:
         method: ``INFORMATIVE``, or a key of ``METHODS``, by which each estimate stands alone.
@@ -58,44 +59,40 @@ class RunningShape:
 
     def __init__(self, method: str) -> None:
         self._method = method
-        self._taken: int | None = None
-        self._found: ShapeEstimate | None = None
+        self._estimates: dict[int, ShapeEstimate | None] = {}  # by the number of presses
 
     def after(self, evidence: ShapeEvidence) -> ShapeEstimate | None:
-        """From all presses of some evidence; None where they say too little.
+        """Return the estimate from all presses of some evidence, solved once; None if they are too few.
 
         Args:
-            evidence: that of the last call and as many presses or more.
+            evidence: readings of the run up to a press.
         """
         presses = len(evidence.touches)
-        if presses != self._taken:
-            first = 0 if self._taken is None else self._taken + 1
-            for count in range(first if self._method == INFORMATIVE else presses, presses + 1):
-                self._found = self._next(replace(evidence, touches=evidence.touches[:count]))
-            self._taken = presses
-        return self._found
+        for count in range(0 if self._method == INFORMATIVE else presses, presses + 1):
+            if count not in self._estimates:
+                part = replace(evidence, touches=evidence.touches[:count])
+                self._estimates[count] = self._solve(part, self._estimates.get(count - 1))
+        return self._estimates[presses]
 
-    def _next(self, evidence: ShapeEvidence) -> ShapeEstimate | None:
+    def _solve(self, evidence: ShapeEvidence, previous: ShapeEstimate | None) -> ShapeEstimate | None:
         try:
             if self._method != INFORMATIVE:
                 return estimated(self._method, evidence)
-            settings = replace(CONTINUED, seed=len(evidence.touches))
-            return continued(evidence, settings, self._found)
+            return continued(evidence, replace(CONTINUED, seed=len(evidence.touches)), previous)
         except FitRefused:
             return None
 
 
+_OF_RUNS: WeakKeyDictionary[RunFiles, dict[str, RunningShape]] = WeakKeyDictionary()
+
+
+def get_running_shape(run: RunFiles, method: str) -> RunningShape:
+    """Return the estimates during a run, which its explorer and its report share."""
+    return _OF_RUNS.setdefault(run, {}).setdefault(method, RunningShape(method))
+
+
 MOST = 4
 """Presses up to which each has an estimate of its own; of more, those at powers of two and the last."""
-
-
-@dataclass(frozen=True, eq=False)
-class LiveEstimate:
-    """What was known after a press."""
-
-    presses: int  #: how many were made by then.
-    evidence: ShapeEvidence  #: from them, and from the picture.
-    estimate: ShapeEstimate | None  #: None where they said too little for one.
 
 
 def steps_of(scene: SceneFile) -> int:
@@ -179,7 +176,7 @@ class ShapeExplorer:
     """Plans a run's presses one at a time."""
 
     def __init__(self, run: RunFiles, method: str) -> None:
-        self._run, self._shape = run, RunningShape(method)
+        self._run, self._shape = run, get_running_shape(run, method)
         self._settings = run.scene.section(ShapeRun)
         self._readings = ShapeReadings(run)
         self._read = 0
@@ -289,17 +286,20 @@ def live_method(choose: Choice) -> str:
     return INFORMATIVE if choose == "active" else QUICK
 
 
-def live_estimates(evidence: ShapeEvidence, method: str) -> Iterator[LiveEstimate]:
-    """The estimates after some of a run's presses, in their order.
+def live_estimates(
+    evidence: ShapeEvidence, running: RunningShape, last: ShapeEstimate | None = None
+) -> Iterator[tuple[ShapeEvidence, ShapeEstimate | None]]:
+    """Yield the readings up to some of a run's presses, in their order, and the estimate; None if too few.
 
     Args:
-        evidence: of the whole run.
-        method: as ``live_method`` names it.
+        evidence: readings of the whole run.
+        running: the estimates so far; missing ones are solved.
+        last: the estimate from all presses, if it is known by the same method.
     """
-    running = RunningShape(method)
     for count in counts_shown(len(evidence.touches)):
         part = replace(evidence, touches=evidence.touches[:count])
-        yield LiveEstimate(count, part, running.after(part))
+        is_last = count == len(evidence.touches) and last is not None
+        yield part, last if is_last else running.after(part)
 
 
 def counts_shown(presses: int) -> list[int]:

@@ -1,6 +1,7 @@
 """Charts of a report: errors against contacts and seconds, costs of settings, numbers beside marks."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -11,7 +12,6 @@ from matplotlib.patheffects import withStroke
 
 from harness.basics.arrays import FloatArray
 from harness.cost.curve import Point, front
-from harness.report.data import ErrorCurve
 from harness.report.figures.style import SOFT, blank, plain_logarithm, styled
 
 _COLOURS = ("#c2410c", "#5b616b", "#0f766e", "#1b3fae", "#9d6b00", "#8a2d79")
@@ -39,6 +39,17 @@ _LINE = 3.0
 
 _RINGS = (9.0, 15.0, 22.0, 30.0)
 _WAYS = 12
+
+
+@dataclass(frozen=True)
+class ErrorCurve:
+    """Errors against the number of contacts, or against seconds."""
+
+    name: str  #: in the legend.
+    x: tuple[float, ...]  #: contacts, or seconds.
+    error: tuple[float, ...]  #: metres, one for each ``x``.
+    labels: tuple[str, ...] = ()  #: next to each point; none if empty.
+    by: str = ""  #: sense or method, a key of ``_OF`` with a colour of its own; empty for the next colour.
 
 
 def error_chart(curves: tuple[ErrorCurve, ...], x_label: str, logarithmic_x: bool) -> Figure:

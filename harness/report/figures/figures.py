@@ -1,7 +1,6 @@
 """Every picture of a report, drawn, written beside the page and kept for inlining."""
 
 import base64
-from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Literal
@@ -13,15 +12,8 @@ from matplotlib.image import imsave
 
 from harness.basics.arrays import AnyArray
 from harness.basics.whole_file import write_bytes_whole
+from harness.experiment.report_content import Picture
 from harness.report.figures.style import styled
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A drawn picture."""
-
-    source: str  #: a ``data:`` address that holds all of it.
-    file: str  #: name of the PNG beside the page.
 
 
 class Album:

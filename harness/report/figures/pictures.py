@@ -1,5 +1,6 @@
 """Pictures of the bench, of the contacts and of the posterior, with their labels."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,10 +14,8 @@ from harness.basics.mesh import Mesh, closed_hull
 from harness.bench.kinematics import arm_table, link_frames
 from harness.bench.sensor import TactileSensor
 from harness.picture.pinhole import Pinhole
-from harness.report.data import BenchPart, BenchScene, ContactRow
-from harness.report.figures.shading import Shot, look_at
+from harness.report.figures.shading import BenchPart, Shot, look_at
 from harness.report.figures.style import ANSWER, DPI, HEAT, INK, TOOL, TRUTH, blank
-from harness.report.values import Missing, Posterior
 from harness.twin.link_hulls import link_hulls
 
 _ELEVATION = np.radians(28.0)
@@ -33,6 +32,18 @@ MOUNT = (0.55, 0.56, 0.60)
 CLAY = (0.93, 0.91, 0.87)
 
 _Z = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Where a contact may have been, as weighted points on the object."""
+
+    points: FloatArray  #: ``(n, 3)`` metres, object frame.
+    weights: FloatArray  #: ``(n,)``, not negative, any sum but zero.
+    estimate: FloatArray  #: ``(3,)`` metres.
+    modes: FloatArray  #: ``(k, 3)`` metres, separate likely positions, the likeliest first.
+    mode_weights: FloatArray  #: ``(k,)`` fraction of the posterior that each holds.
+    credible90: float  #: metres around the estimate that hold 90 % of the posterior.
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,72 +127,83 @@ class Heat:
         return np.asarray(map_coordinates(self._grid, at.T, order=1, mode="constant"))
 
 
-def bench_figure(bench: BenchScene) -> Figure:
-    """Bench and object, the tool axis of every contact drawn into it."""
-    camera = look_at(bench.focus, np.radians(-118.0), np.radians(22.0), _BENCH_WIDTH, 680, 1040)
-    shot = Shot(bench.parts, camera)
+def bench_figure(parts: tuple[BenchPart, ...], base_from_gels: FloatArray, focus: FloatArray) -> Figure:
+    """Bench and object with the tool axis of every contact.
+
+    Args:
+        parts: bodies, the object among them.
+        base_from_gels: ``(n, 4, 4)`` gel poses of the contacts.
+        focus: ``(3,)`` metres in base, the point in the centre.
+    """
+    camera = look_at(focus, np.radians(-118.0), np.radians(22.0), _BENCH_WIDTH, 680, 1040)
+    shot = Shot(parts, camera)
     figure = blank(camera.width / DPI, camera.height / DPI)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
-    figure, axes = figure, axes
     picture = shot.picture()
     axes.imshow(picture)
-    for base_from_gel in bench.base_from_gels:
+    for base_from_gel in base_from_gels:
         _tool_axis(axes, shot, base_from_gel, "", 0.05, 7.5)
     _crop(figure, axes, picture)
     return figure
 
 
-def contacts_figure(sides: Sides, contacts: tuple[ContactRow, ...]) -> Figure:
-    """The object from two sides with the tool axis of every contact."""
+def contacts_figure(sides: Sides, object_from_gels: FloatArray, truths: FloatArray | None) -> Figure:
+    """The object from two sides with the tool axis of every contact.
+
+    Args:
+        sides: views of the object.
+        object_from_gels: ``(n, 4, 4)`` estimated gel poses.
+        truths: ``(n, 3)`` metres, object frame; None where unknown.
+    """
     figure, both = _row(2, 5.4)
     for axes, shot in zip(both, sides.shots, strict=True):
         axes.imshow(shot.picture())
-        for contact in contacts:
-            if not isinstance(contact.object_from_gel, Missing):
-                _tool_axis(axes, shot, contact.object_from_gel, str(contact.number), 0.14 * sides.size, 9.0)
-            if contact.truth is not None:
-                mark(axes, shot, contact.truth, "*", TRUTH, 130.0)
+        for number, pose in enumerate(object_from_gels, start=1):
+            _tool_axis(axes, shot, pose, str(number), 0.14 * sides.size, 9.0)
+            if truths is not None:
+                mark(axes, shot, truths[number - 1], "*", TRUTH, 130.0)
     return figure
 
 
-def posterior_strip(sides: Sides, contacts: tuple[ContactRow, ...]) -> Figure:
-    """The posterior after each contact, seen from both sides, one column a contact."""
-    shown = [contact for contact in contacts if isinstance(contact.posterior, Posterior)]
-    figure = blank(2.0 * len(shown), 4.25)
-    grid = np.asarray(figure.subplots(2, len(shown), squeeze=False))
+def posterior_strip(sides: Sides, posteriors: Mapping[int, Posterior], truths: FloatArray | None) -> Figure:
+    """The posterior after each contact, seen from both sides, one column a contact.
+
+    Args:
+        sides: views of the object.
+        posteriors: by the number of the contact, from 1; at least one.
+        truths: ``(n, 3)`` metres of every contact, object frame; None where unknown.
+    """
+    figure = blank(2.0 * len(posteriors), 4.25)
+    grid = np.asarray(figure.subplots(2, len(posteriors), squeeze=False))
     figure.subplots_adjust(0.0, 0.0, 1.0, 0.94, 0.02, 0.02)
-    for column, contact in enumerate(shown):
-        grid[0, column].set_title(f"after contact {contact.number}", fontsize=10)
-        heat = Heat(_of(contact))
-        for row, shot in enumerate(sides.shots):
-            _posterior_on(grid[row, column], shot, contact, heat, 34.0)
+    for (number, posterior), column in zip(posteriors.items(), grid.T, strict=True):
+        column[0].set_title(f"after contact {number}", fontsize=10)
+        heat = Heat(posterior)
+        for axes, shot in zip(column, sides.shots, strict=True):
+            _posterior_on(axes, shot, posterior, heat, None if truths is None else truths[number - 1], 34.0)
     return figure
 
 
-def posterior_figure(sides: Sides, contact: ContactRow) -> Figure:
-    """The posterior after one contact, large."""
+def posterior_figure(sides: Sides, posterior: Posterior, truth: FloatArray | None) -> Figure:
+    """The posterior of one contact, large; ``truth`` is ``(3,)`` metres, or None where unknown."""
     figure, both = _row(2, 5.4)
-    heat = Heat(_of(contact))
+    heat = Heat(posterior)
     for axes, shot in zip(both, sides.shots, strict=True):
-        _posterior_on(axes, shot, contact, heat, 150.0)
+        _posterior_on(axes, shot, posterior, heat, truth, 150.0)
     return figure
 
 
-def _of(contact: ContactRow) -> Posterior:
-    assert isinstance(contact.posterior, Posterior)
-    return contact.posterior
-
-
-def _posterior_on(axes: Axes, shot: Shot, contact: ContactRow, heat: Heat, size: float) -> None:
-    posterior = _of(contact)
+def _posterior_on(
+    axes: Axes, shot: Shot, posterior: Posterior, heat: Heat, truth: FloatArray | None, size: float
+) -> None:
     axes.imshow(shot.picture(0, heat))
     axes.set_axis_off()
     for place in posterior.modes[1:]:
         mark(axes, shot, place, "o", INK, 0.45 * size, hollow=True)
     mark(axes, shot, posterior.estimate, "P", ANSWER, size)
-    if contact.truth is not None:
-        mark(axes, shot, contact.truth, "*", TRUTH, 1.3 * size)
+    if truth is not None:
+        mark(axes, shot, truth, "*", TRUTH, 1.3 * size)
 
 
 def _tool_axis(

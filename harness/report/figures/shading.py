@@ -13,7 +13,6 @@ from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means
 from harness.basics.geometry import apply, inverse, transform
 from harness.basics.mesh import Mesh
 from harness.picture.pinhole import Pinhole
-from harness.report.data import BenchPart
 from harness.sim.gel.height_map import RasterMesh, depth_image
 
 Paint = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
@@ -26,6 +25,16 @@ _SHADOW_PIXELS = 800
 _KEY, _FILL, _SKY, _BASE, _SHINE = 0.58, 0.22, 0.22, 0.20, 0.07
 
 _BACKWARD = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class BenchPart:
+    """A body in a picture."""
+
+    mesh: Mesh  #: metres, in its own frame.
+    base_from_part: FloatArray  #: ``(4, 4)``.
+    colour: tuple[float, float, float]  #: red, green, blue from 0 to 1.
+    smooth: bool = True  #: whether edges of less than 38 degrees are shaded as one smooth surface.
 
 
 class Shot:

@@ -1,7 +1,6 @@
-"""What is believed of a size, and what each sense saw of it: an outline, resonances, contacts."""
+"""Figures of a size: posterior density, outline, resonances and contacts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,24 +12,6 @@ from harness.report.figures.style import ANSWER, INK, SOFT, TOOL, TRUTH, blank, 
 _COLOURS = {"vision": "#8a2d79", "audio": ANSWER, "touch": TRUTH, "fused": INK}
 _AROUND = 0.35
 _CLOSE = 0.15
-
-
-@dataclass(frozen=True, eq=False)
-class Resonances:
-    """What was heard beside what the model would sound like at the size found."""
-
-    heard: FloatArray  #: ``(p, 2)`` Hz and dB re 1 Pa/N.
-    modelled: FloatArray  #: ``(m, 2)`` likewise.
-    band: tuple[float, float]  #: Hz, from and to, that the strikes excited.
-
-
-@dataclass(frozen=True, eq=False)
-class TouchedObject:
-    """The object as large as it was found, and where it was met."""
-
-    surface: FloatArray  #: ``(n, 3)`` m, samples of it, upright.
-    contacts: FloatArray  #: ``(c, 3)`` m, the middle of each.
-    passed: Sequence[FloatArray]  #: ``(n, 3)`` m each: ways of the gel that met nothing.
 
 
 def beliefs_figure(
@@ -65,10 +46,10 @@ def beliefs_figure(
         whole.set_xscale("log")
         plain_logarithm(whole.xaxis, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0))
         whole.set_xlim(1e2 * sizes[0], 1e2 * sizes[-1])
-        whole.set_title("all that was searched (dotted: asked about)", fontsize=9, loc="left")
+        whole.set_title("searched sizes (dotted: requested range)", fontsize=9, loc="left")
         middle = 1e2 * sizes[int(beliefs["fused"].argmax())]
         near.set_xlim((1.0 - _CLOSE) * middle, (1.0 + _CLOSE) * middle)
-        near.set_title("about the answer", fontsize=9, loc="left")
+        near.set_title("near the answer", fontsize=9, loc="left")
         whole.set_ylabel("density, greatest = 1")
         near.legend(loc="upper right", frameon=False, fontsize=8)
     return figure
@@ -90,7 +71,7 @@ def outline_figure(picture: ByteArray, seen: FloatArray, fitted: FloatArray | No
         axes.imshow(picture, interpolation="nearest", extent=(0, picture.shape[1], picture.shape[0], 0))
         _ring(axes, seen, TOOL, "hull of what the camera sees", 2.6)
         if fitted is not None:
-            _ring(axes, fitted, ANSWER, "the model at the size found", 1.2)
+            _ring(axes, fitted, ANSWER, "the model at the estimated size", 1.2)
         axes.set_xlim(max(0.0, low[0] - margin), min(picture.shape[1], high[0] + margin))
         axes.set_ylim(min(picture.shape[0], high[1] + margin), max(0.0, low[1] - margin))
         axes.set_xticks([])
@@ -99,21 +80,27 @@ def outline_figure(picture: ByteArray, seen: FloatArray, fitted: FloatArray | No
     return figure
 
 
-def resonances_figure(shown: Resonances) -> Figure:
-    """Heard peaks above, the model's modes at the size found below, over one axis of frequency."""
+def resonances_figure(recorded: FloatArray, modelled: FloatArray, band: tuple[float, float]) -> Figure:
+    """Recorded peaks above, the model's modes at the estimated size below, over one axis of frequency.
+
+    Args:
+        recorded: ``(p, 2)`` Hz and dB re 1 Pa/N.
+        modelled: ``(m, 2)`` likewise.
+        band: Hz, lowest and highest frequency that the strikes excited.
+    """
     with styled():
         figure = blank(8.2, 3.6, "constrained")
         above, below = figure.subplots(2, 1, sharex=True)
         for axes, lines, colour, title in (
-            (above, shown.heard, TOOL, "heard"),
-            (below, shown.modelled, ANSWER, "model, at the size found"),
+            (above, recorded, TOOL, "recorded"),
+            (below, modelled, ANSWER, "model at the estimated size"),
         ):
-            inside = (lines[:, 0] > 0.5 * shown.band[0]) & (lines[:, 0] < 1.5 * shown.band[1])
+            inside = (lines[:, 0] > 0.5 * band[0]) & (lines[:, 0] < 1.5 * band[1])
             floor = float(lines[inside, 1].min()) - 6.0 if inside.any() else -60.0
             axes.vlines(lines[inside, 0], floor, lines[inside, 1], color=colour, lw=1.6)
             axes.set_title(title, fontsize=9, loc="left")
             axes.set_ylabel("dB re 1 Pa/N")
-            axes.axvspan(*shown.band, color="#f3f1ec", zorder=0)
+            axes.axvspan(*band, color="#f3f1ec", zorder=0)
         below.set_xlabel("Hz (shaded: what the hammer excited)")
     return figure
 
@@ -139,19 +126,23 @@ def spectrogram_figure(frequencies: FloatArray, levels: Mapping[str, FloatArray]
     return figure
 
 
-def touched_figure(shown: TouchedObject) -> Figure:
-    """The object from above and from the side, with its contacts and the ways that met nothing."""
+def touched_figure(surface: FloatArray, contacts: FloatArray, passed: Sequence[FloatArray]) -> Figure:
+    """The object from above and from the side, with its contacts and the probe lines without contact.
+
+    Args:
+        surface: ``(n, 3)`` m, samples of the surface at the estimated size, upright.
+        contacts: ``(c, 3)`` m, the centre of each.
+        passed: ``(n, 3)`` m each, probe lines without contact.
+    """
     with styled():
         figure = blank(8.2, 3.8, "constrained")
-        for axes, across, up, title in zip(
-            figure.subplots(1, 2), (0, 0), (1, 2), ("from above", "from the side"), strict=True
+        for axes, up, title in zip(
+            figure.subplots(1, 2), (1, 2), ("from above", "from the side"), strict=True
         ):
-            axes.plot(
-                1e2 * shown.surface[:, across], 1e2 * shown.surface[:, up], ".", ms=1.5, color="#c9c5bb"
-            )
-            for way in shown.passed:
-                axes.plot(1e2 * way[:, across], 1e2 * way[:, up], color=SOFT, lw=0.8, ls=":")
-            axes.plot(1e2 * shown.contacts[:, across], 1e2 * shown.contacts[:, up], "o", ms=5, color=TOOL)
+            axes.plot(1e2 * surface[:, 0], 1e2 * surface[:, up], ".", ms=1.5, color="#c9c5bb")
+            for line in passed:
+                axes.plot(1e2 * line[:, 0], 1e2 * line[:, up], color=SOFT, lw=0.8, ls=":")
+            axes.plot(1e2 * contacts[:, 0], 1e2 * contacts[:, up], "o", ms=5, color=TOOL)
             axes.set_aspect("equal", adjustable="datalim")
             axes.set_title(title, fontsize=9, loc="left")
             axes.set_xlabel("cm")

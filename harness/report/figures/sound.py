@@ -14,11 +14,11 @@ from scipy.signal import stft
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.mesh import Mesh
+from harness.experiment.report_content import Missing
 from harness.objectfile.surface_search import SurfaceSearch
-from harness.report.figures.pictures import Heat, mark, object_sides
+from harness.report.figures.pictures import Heat, Posterior, mark, object_sides
 from harness.report.figures.shading import Paint, Shot
 from harness.report.figures.style import ANSWER, INK, SOFT, TOOL, TRUTH, blank, styled
-from harness.report.values import Missing, Posterior
 
 FLOOR = -70.0
 """dB against a spectrogram's own loudest, below which nothing is told apart."""

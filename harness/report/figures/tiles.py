@@ -2,12 +2,13 @@
 
 from io import BytesIO
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
-from harness.basics.arrays import AnyArray, BoolArray, ByteArray, block_means
+from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, block_means
 from harness.picture.live_picture import LiveComparison
 from harness.report.figures.style import ANSWER, TOOL, blank, styled, titled_picture
 
@@ -26,6 +27,13 @@ def difference(live: AnyArray, simulated: AnyArray) -> ByteArray:
     """Live less simulated, amplified, about middle grey."""
     apart = live.astype(np.float64) - simulated.astype(np.float64)
     return np.clip(127.5 + DIFFERENCE_GAIN * apart, 0.0, 255.0).astype(np.uint8)
+
+
+def height_picture(height: FloatArray, highest: float) -> ByteArray:
+    """Colour an indentation map in m as ``(rows, columns, 3)``, dark at 0 and bright at ``highest``."""
+    level = np.clip(height / highest, 0.0, 1.0) if highest > 0.0 else np.zeros_like(height)
+    colours = mpl.colormaps["viridis"](level)[..., :3]
+    return np.asarray(np.round(255.0 * colours), dtype=np.uint8)
 
 
 def png(picture: AnyArray) -> bytes:

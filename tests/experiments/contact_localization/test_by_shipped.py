@@ -21,7 +21,7 @@ from harness.experiment.in_process import perform_run
 from harness.experiment.levels import chosen_levels
 from harness.experiment.object_modes import object_modes
 from harness.recording.run_folder import RunFiles
-from harness.report.run_page import network_rows
+from harness.report.run_page import find_networks
 from harness.sim.gel import height_map
 
 STATION = load_station(station_path("mock"))
@@ -79,7 +79,7 @@ def test_networks_stand_for_every_simulation(run: RunFiles, simulated: list[str]
     assert np.isfinite(picture).all()
     assert picture.max() > 0.01
     assert comparison.observed()["camera.image"]["parts"].keys() == {"colour", "coverage"}
-    assert [row.file for row in network_rows(scored)] == ["touch.onnx", "vision.onnx"]
+    assert [row.file for row in find_networks(scored)] == ["touch.onnx", "vision.onnx"]
 
 
 def test_its_modes_are_the_networks_and_nothing_is_solved(simulated: list[str]) -> None:

@@ -1,6 +1,7 @@
 """A run of scale estimation in process: a look, contacts, strikes; answered from the folder alone."""
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
 from harness.recording.step_file import StepRecord
+from harness.report.run_page import write_run_page
 from tests.experiments.scale_estimation.runs import answered, ran, scene_of, went_on
 from tests.support.whole_run import with_reading, with_spoiled_pictures
 
@@ -242,13 +244,11 @@ def test_a_scene_that_reads_nothing_is_refused_before_anything_moves(
 
 
 def test_the_report_shows_each_sense_beside_the_model(touched: Recording, tmp_path: Path) -> None:
-    def no_page(*_: Any) -> Path:
-        raise AssertionError("the experiment has a page of its own")
-
     accuracy = Accuracy.default(EXPERIMENT.knobs)
-    result = finish(EXPERIMENT, RunFiles(touched), accuracy, no_page, folder=tmp_path)
+    draw = partial(write_run_page, EXPERIMENT)
+    result = finish(EXPERIMENT, RunFiles(touched), accuracy, draw, folder=tmp_path)
     page = Path(result["report"]).read_text()
-    for title in ("What is believed of the size", "By sight", "By touch"):
-        assert f"<h2>{title}</h2>" in page
+    for title in ("Posterior of the size", "Vision", "Touch"):
+        assert f"<h3>{title}</h3>" in page
     assert page.count("<img") == 3
     assert "MOCK" in page

@@ -1,5 +1,6 @@
 """An object that nobody has drawn is explored: its mesh is the mocked world's alone."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from harness.objects.builtin import build
 from harness.picture.outline import SeenOutline
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
+from harness.report.run_page import write_run_page
 from harness.skills.exploring.unknown_space import margin_of, unknown_space
 from harness.skills.strike import POSE
 from harness.twin.rehearsal import rehearse
@@ -114,7 +116,8 @@ def test_it_is_struck_where_the_gel_has_met_it(struck: Recording) -> None:
 @pytest.mark.slow  # a whole run with strikes; each sense has tests of its own
 def test_every_sense_answers_and_none_looks_at_the_drawing(struck: Recording, tmp_path: Path) -> None:
     accuracy = Accuracy.default(EXPERIMENT.knobs)
-    result = finish(EXPERIMENT, RunFiles(struck), accuracy, lambda *_: tmp_path, folder=tmp_path)
+    draw = partial(write_run_page, EXPERIMENT)
+    result = finish(EXPERIMENT, RunFiles(struck), accuracy, draw, folder=tmp_path)
     assert not result["shape_known"]
     for sense in ("vision", "audio", "touch", "fused"):
         one = result["estimates"][sense]

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from harness.objects.builtin import build
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
+from harness.report.run_page import write_run_page
 from harness.skills.exploring.exploration import MOST_SKIPPED, SKIPPED
 from harness.twin.rehearsal import Segment, rehearse
 from tests.docs.result_keys import COMMON, SHAPE, SHAPE_ESTIMATE
@@ -162,22 +164,20 @@ def test_a_run_that_was_stopped_goes_on_with_the_same_presses(
 
 
 def test_the_report_and_the_surfaces_are_beside_the_result(touched: Recording, tmp_path: Path) -> None:
-    def no_page(*_: Any) -> Path:
-        raise AssertionError("the experiment has a page of its own")
-
-    result = finish(EXPERIMENT, RunFiles(touched), QUICKLY, no_page, folder=tmp_path)
+    draw = partial(write_run_page, EXPERIMENT)
+    result = finish(EXPERIMENT, RunFiles(touched), QUICKLY, draw, folder=tmp_path)
     page = Path(result["report"]).read_text()
-    for title in ("The surface", "Press by press", "Sections", "The silhouette"):
-        assert f"<h2>{title}</h2>" in page
+    for title in ("The surface", "Press by press", "Cross-sections", "The silhouette"):
+        assert f"<h3>{title}</h3>" in page
     assert page.count("<img") == 4
     assert page.count('<canvas class="turned"') == page.count("<script>") == 1
     assert "http" not in page
     assert len(page) < 1_500_000
     assert set(re.findall('href="#([^"]+)"', page)) <= set(re.findall('id="([^"]+)"', page))
-    assert max(len(cell) for cell in re.findall("<td>(.*?)</td>", page)) < 400  # result.json has them whole
+    assert max(len(cell) for cell in re.findall("<td>(.*?)</td>", page)) < 400  # long arrays are left out
     assert "MOCK" in page
-    assert f"By all readings: {result['contacts']} contact" in page
-    assert f"{result['ended_by_housing']} way" in page
+    assert f"from all readings: {result['contacts']} contact" in page
+    assert f"{result['ended_by_housing']} probe line" in page
     for sense in ("touch", "fused"):
         assert (tmp_path / result["estimates"][sense]["mesh"]).stat().st_size > 100
     assert len(EXPERIMENT.lines(result)) == 3

@@ -1,17 +1,15 @@
 """The part that holds live readings beside a model: verdicts with their numbers, and a picture."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from harness.agreement.agreement import Agreement, Residual, SenseResiduals, SideBySide, judged
-from harness.report.agreement_part import AgreementPart, agreement_part
-from harness.report.data import ReportData
+from harness.experiment.report_content import CaptionedPicture, Missing, Picture, ReportTable
+from harness.report.agreement_part import show_agreement
 from harness.report.figures.figures import Album
-from harness.report.page import write_report
-from harness.report.values import Missing
+from tests.harness.report.conftest import Stub
 
 FIELD = np.linspace(0.0, 2e-3, 24).reshape(4, 6)
 
@@ -35,33 +33,32 @@ def agreement() -> Agreement:
 
 
 def test_each_sense_has_its_verdict_and_numbers(agreement: Agreement, tmp_path: Path) -> None:
-    part = agreement_part(agreement, Album(tmp_path))
-    assert isinstance(part, AgreementPart)
-    assert part.summary == "First in doubt: touch, at step 3."
-    assert [row.verdict for row in part.rows] == ["does not fit", "fits", "not comparable"]
-    assert "step 3, gel surface, chi-square 99.0" in part.rows[0].sentence
-    assert "rms 0.4 mm, turned 5.73°" in part.rows[0].sentence
-    assert part.rows[2].sentence == "the scene uses no camera"
+    words, table, shown = show_agreement(agreement, Album(tmp_path))
+    assert isinstance(table, ReportTable)
+    assert str(words).endswith(" First in doubt: touch, at step 3.")
+    assert [row[2] for row in table.rows] == ["does not fit", "fits", "not comparable"]
+    assert "step 3, gel surface, chi-square 99.0" in str(table.rows[0][3])
+    assert "rms 0.4 mm, turned 5.73°" in str(table.rows[0][3])
+    assert table.rows[2][3] == "the scene uses no camera"
+    assert isinstance(shown, CaptionedPicture)
+    assert isinstance(shown.picture, Picture)
     assert (tmp_path / "agreement.png").exists()
 
 
 def test_a_run_that_was_not_compared_says_so(tmp_path: Path) -> None:
-    gone = Missing("the reason")
-    assert agreement_part(gone, Album(tmp_path)) is gone
+    assert show_agreement(None, Album(tmp_path)) == (Missing("the readings were not compared with a model"),)
 
 
 def test_a_run_of_which_nothing_can_be_compared_has_no_picture(tmp_path: Path) -> None:
     nothing = judged("mug", [SenseResiduals("touch", "reference", (), "no picture of the gel")])
-    part = agreement_part(nothing, Album(tmp_path))
-    assert isinstance(part, AgreementPart)
-    assert part.summary == "Nothing could be compared."
-    assert isinstance(part.picture, Missing)
+    words, _, shown = show_agreement(nothing, Album(tmp_path))
+    assert str(words).endswith(" Nothing could be compared.")
+    assert isinstance(shown, CaptionedPicture)
+    assert isinstance(shown.picture, Missing)
 
 
-def test_the_page_shows_it(report_data: ReportData, agreement: Agreement, tmp_path: Path) -> None:
-    gone = Missing("left out")
-    light = replace(report_data, bench=gone, contacts=(), sound=gone, agreement=agreement)
-    text = write_report(light, tmp_path).read_text(encoding="utf-8")
+def test_the_page_shows_it(agreement: Agreement, tmp_path: Path) -> None:
+    text = Stub(agreement=agreement).write(tmp_path).read_text(encoding="utf-8")
     assert "First in doubt: touch, at step 3." in text
     assert "does not fit" in text
     assert (tmp_path / "agreement.png").exists()

@@ -1,6 +1,7 @@
 """What the report says of each sense: every strike accounted for, every peak beside its mode."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -14,8 +15,19 @@ from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.estimate import SPACING, locate
 from experiments.contact_localization.posterior.likelihood import Noise
 from experiments.contact_localization.posterior.policy import Readings
-from experiments.contact_localization.report.sound_report import contact_time, sound_of, strike_line
+from experiments.contact_localization.posterior.strikes import StrikeEvidence
+from experiments.contact_localization.report.sound_report import (
+    contact_time,
+    estimate_sound_scale,
+    format_peak,
+    format_strike,
+    gather_strikes,
+    match_peaks,
+    pair_spectrograms,
+    show_senses,
+)
 from experiments.contact_localization.settings import KNOBS
+from experiments.contact_localization.sound.likelihood import ModeRow
 from experiments.contact_localization.touch.touch import Contact
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import frame_facing, transform
@@ -24,10 +36,12 @@ from harness.bench.acquisition import Strike
 from harness.bench.sensor import GELSIGHT_R15
 from harness.effects.accuracy import Accuracy
 from harness.experiment.experiment import Scored
+from harness.experiment.report_content import CaptionedPicture, Missing, PageBlock, PageSection, ReportTable
 from harness.experiment.truth import Truth
 from harness.recording.observation import Observation
-from harness.report.data import Sound
-from harness.report.values import Missing
+from harness.report.figures.figures import Album
+from harness.report.figures.pictures import object_sides
+from harness.report.wording import NONE, duration
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples import sounding_plate as plate
 from tests.samples.blows import half_sine
@@ -73,17 +87,27 @@ def scored(model: Model, strikes: tuple[Strike | None, ...], asked: bool = True)
         "audio",
         {"touch": FitRefused("these are not presses of this object")},
     )
-    run = SimpleNamespace(scene=SimpleNamespace(sensors=SimpleNamespace(sound=asked)))
+    run = SimpleNamespace(scene=SimpleNamespace(sensors=SimpleNamespace(sound=asked)), mesh=model.mesh)
     truth = Truth({k: POINTS[k] for k in range(K)}, {})
     nothing = cast(Any, None)
     accuracy = Accuracy.default(KNOBS).with_({SPACING.name: COARSE})
     return Scored(cast(Any, run), nothing, found, truth, accuracy, ())
 
 
-def shown(model: Model, strikes: tuple[Strike | None, ...]) -> Sound:
-    sound = sound_of(scored(model, strikes))
-    assert isinstance(sound, Sound)
-    return sound
+def heard_of(model: Model, strikes: tuple[Strike | None, ...]) -> tuple[Answer, StrikeEvidence]:
+    made = scored(model, strikes)
+    heard = gather_strikes(made)
+    assert isinstance(heard, StrikeEvidence)
+    return made.found, heard
+
+
+def blocks_of(made: ScoredContact, folder: Path) -> tuple[list[PageBlock], dict[str, list[PageBlock]]]:
+    """The blocks of the section, and those of its subsections by title."""
+    sides = object_sides(made.run.mesh, made.found.last.position_in_object, 40)
+    pose = transform(frame_facing(np.array([0.0, 0.0, -1.0]), 0.3), POINTS[-1])
+    blocks = list(show_senses(made, pose, sides, Album(folder)))
+    sections = {one.title: list(one.blocks) for one in blocks if isinstance(one, PageSection)}
+    return [one for one in blocks if not isinstance(one, PageSection)], sections
 
 
 def silent(strike: Strike) -> Strike:
@@ -91,52 +115,73 @@ def silent(strike: Strike) -> Strike:
 
 
 def test_a_scene_without_sound_says_that_none_was_called_for(model: Model) -> None:
-    assert sound_of(scored(model, (None,) * K, asked=False)) == Missing("the scene called for no sound")
-    assert sound_of(scored(model, (None,) * K)) == Missing("no contact was struck")
+    assert gather_strikes(scored(model, (None,) * K, asked=False)) == Missing("the scene called for no sound")
+    assert gather_strikes(scored(model, (None,) * K)) == Missing("no contact was struck")
 
 
-def test_each_sense_is_shown_or_says_why_not(model: Model) -> None:
-    made = scored(model, STRIKES)
-    sound = sound_of(made)
-    assert isinstance(sound, Sound)
-    touch, audio = sound.senses
-    assert (touch.name, audio.name) == ("touch", "audio")
-    assert touch.posterior == Missing("these are not presses of this object")
-    assert (touch.error, touch.area, touch.seconds) == (None, None, None)
-    assert not isinstance(audio.posterior, Missing)
-    last = made.found.last
-    assert audio.error == pytest.approx(np.linalg.norm(last.position_in_object - POINTS[-1]))
-    assert audio.posterior.estimate == pytest.approx(last.position_in_object)
-    assert len(audio.posterior.modes) == len(last.modes) == len(audio.posterior.mode_weights)
-    assert audio.area == last.region.area
-    assert audio.seconds == pytest.approx(sum(last.seconds.values()))
+def test_each_sense_is_shown_or_says_why_not(model: Model, tmp_path: Path) -> None:
+    (picture, refused), sections = blocks_of(scored(model, STRIKES), tmp_path)
+    assert isinstance(picture, CaptionedPicture)
+    assert "green star" in picture.caption
+    assert refused == Missing("no answer from touch: these are not presses of this object")
+    assert list(sections) == ["Strikes", "Peaks and modes"]
+    assert (tmp_path / "senses.png").exists()
+    assert (tmp_path / "spectrograms.png").exists()
 
 
-def test_without_a_truth_no_sense_has_an_error(model: Model) -> None:
-    sound = sound_of(replace(scored(model, STRIKES), truth=None))
-    assert isinstance(sound, Sound)
-    assert [sense.error for sense in sound.senses] == [None, None]
+def test_without_a_truth_none_is_shown(model: Model, tmp_path: Path) -> None:
+    (picture, _), _ = blocks_of(replace(scored(model, STRIKES), truth=None), tmp_path)
+    assert isinstance(picture, CaptionedPicture)
+    assert "green star" not in picture.caption
 
 
-def test_peaks_stand_beside_the_modes_that_made_them(model: Model) -> None:
-    sound = shown(model, STRIKES)
-    assert not isinstance(sound.peaks, Missing)
-    assert sound.scale == pytest.approx(SCALE, abs=0.012)
-    assert len(sound.peaks) >= 6
-    for peak in sound.peaks:
+def test_peaks_stand_beside_the_modes_that_made_them(model: Model, tmp_path: Path) -> None:
+    found, heard = heard_of(model, STRIKES)
+    peaks, factor = match_peaks(found, heard), estimate_sound_scale(found, heard)
+    assert not isinstance(peaks, Missing)
+    assert factor == pytest.approx(SCALE, abs=0.012)
+    assert len(peaks) >= 6
+    for peak in peaks:
         assert peak.modes
-        true = SCALE * MODES.frequencies[np.array(peak.modes) - 1].mean()
+        true = SCALE * MODES.frequencies[np.array(peak.modes)].mean()
         assert peak.frequency == pytest.approx(true, rel=0.01)
-        assert peak.apart == pytest.approx(0.0, abs=0.02)
-        assert peak.mode_damping is not None
-        assert peak.mode_damping > 0.0
-        assert peak.counted == pytest.approx(peak.weight * peak.nats)
-    assert sum(peak.counted for peak in sound.peaks) > 0.0
-    assert sound.band is not None
-    assert 0.0 < sound.band[0] < sound.peaks[0].frequency < sound.peaks[-1].frequency < sound.band[1]
+        assert peak.frequency / peak.model_frequency == pytest.approx(1.0, abs=0.02)
+        assert peak.model_damping > 0.0
+    assert sum(heard.term.weight * peak.nats for peak in peaks) > 0.0
+    band = heard.term.evidence.band
+    assert 0.0 < band[0] < peaks[0].frequency < peaks[-1].frequency < band[1]
+    words, _, table = blocks_of(scored(model, STRIKES), tmp_path)[1]["Peaks and modes"]
+    assert f"{len(peaks)} resonances in common, {len(peaks)} of them matched to modes" in str(words)
+    assert f"The object rings {100.0 * (factor - 1.0):.1f} % above its model." in str(words)
+    assert isinstance(table, ReportTable)
+    weights = np.array([abs(peak.nats) for peak in peaks])
+    bars = [row[-1] for row in table.rows if not isinstance(row[-1], str)]
+    assert [bar.percent for bar in bars] == pytest.approx(100.0 * weights / weights.max())
+    assert [bar.is_negative for bar in bars] == [peak.nats < 0.0 for peak in peaks]
 
 
-def test_every_strike_has_a_line_and_what_is_wrong_with_it(model: Model) -> None:
+@pytest.mark.parametrize(
+    ("row", "cells"),
+    [
+        (
+            ModeRow(2465.0, 44.0, 0.031, 0.0, (1, 2), 2471.7, 49.0, 0.71, -1.4),
+            "2465 Hz|0 dB|2 to 3|2471.7 Hz|-0.27 %|71 %|44 1/s|49 1/s|3.1 %|-1.40 at weight 0.2",
+        ),
+        (
+            ModeRow(1225.7, 31.0, 0.013, -4.0, (0,), 1225.1, 24.0, 0.97, 5.21),
+            "1225.7 Hz|-4 dB|1|1225.1 Hz|+0.05 %|97 %|31 1/s|24 1/s|1.3 %|+5.21 at weight 0.2",
+        ),
+        (
+            ModeRow(5111.0, 60.0, 0.092, -21.0, (), 0.0, 0.0, 0.88, 0.0),
+            f"5111 Hz|-21 dB|none|{NONE}|{NONE}|88 %|60 1/s|{NONE}|9.2 %|+0.00 at weight 0.2",
+        ),
+    ],
+)
+def test_a_peak_is_a_row_with_its_modes(row: ModeRow, cells: str) -> None:
+    assert "|".join(format_peak(row, 0.2)) == cells
+
+
+def test_every_strike_has_a_line_and_what_is_wrong_with_it(model: Model, tmp_path: Path) -> None:
     damaged = (
         STRIKES[0],
         replace(STRIKES[1], double_hit=True),
@@ -144,31 +189,41 @@ def test_every_strike_has_a_line_and_what_is_wrong_with_it(model: Model) -> None
         replace(STRIKES[3], overload=True),
         silent(STRIKES[4]),
     )
-    sound = shown(model, damaged)
-    assert [line.contact for line in sound.strikes] == [1, 2, 3, 4, 5]
-    said = ["", "the hammer hit twice", "not struck", "a channel was overloaded", "no strike came"]
-    assert [line.unused for line in sound.strikes] == said
-    assert [line.force is None for line in sound.strikes] == [False, False, True, False, True]
-    assert sound.strikes[0].force == pytest.approx(20.0, rel=0.05)
-    assert sound.strikes[0].pressure == pytest.approx(np.abs(STRIKES[0].pressure).max())
-    assert isinstance(sound.peaks, Missing)
-    assert "strikes" in sound.peaks.reason
-    assert sound.band is None
-    assert not isinstance(sound.pair, Missing)
-    assert sound.pair.contact == 1
+    found, heard = heard_of(model, damaged)
+    sections = blocks_of(scored(model, damaged), tmp_path)[1]
+    words, table, _ = sections["Strikes"]
+    assert words == "1 of 5 strikes count."
+    assert isinstance(table, ReportTable)
+    assert [row[0] for row in table.rows] == ["1", "2", "3", "4", "5"]
+    unused = ["the hammer hit twice", "not struck", "a channel was overloaded", "no strike came"]
+    assert [row[1] for row in table.rows] == ["used", *(f"not used: {reason}" for reason in unused)]
+    assert [row[2] == NONE for row in table.rows] == [False, False, True, False, True]
+    force, contact, pressure = STRIKES[0].force, STRIKES[0], np.abs(STRIKES[0].pressure).max()
+    assert force.max() == pytest.approx(20.0, rel=0.05)
+    assert table.rows[0][2:] == (
+        f"{force.max():.3g} N",
+        duration(contact_time(force, contact.rate)),
+        f"{pressure:.3g} Pa",
+    )
+    (missing,) = sections["Peaks and modes"]
+    assert isinstance(missing, Missing)
+    assert "strikes" in missing.reason
+    pair = pair_spectrograms(found, heard)
+    assert not isinstance(pair, Missing)
+    assert pair[0] == 1
 
 
 def test_the_spectrograms_are_of_the_last_strike_that_counts(model: Model) -> None:
-    sound = shown(model, (*STRIKES[:-1], silent(STRIKES[-1])))
-    assert not isinstance(sound.pair, Missing)
-    pair = sound.pair
-    assert pair.contact == K - 1
-    shape = (len(pair.frequencies), len(pair.times))
-    assert pair.recorded.shape == pair.simulated.shape == shape
-    early = [levels[:, :5].max(axis=1) for levels in (pair.recorded, pair.simulated)]
+    pair = pair_spectrograms(*heard_of(model, (*STRIKES[:-1], silent(STRIKES[-1]))))
+    assert not isinstance(pair, Missing)
+    contact, recorded, simulated = pair
+    assert contact == K - 1
+    assert recorded.levels.shape == simulated.levels.shape
+    assert recorded.levels.shape == (len(recorded.frequencies), len(recorded.times))
+    early = [shown.levels[:, :5].max(axis=1) for shown in (recorded, simulated)]
     assert np.corrcoef(*early)[0, 1] > 0.5
-    none = shown(model, tuple(silent(strike) for strike in STRIKES))
-    assert none.pair == Missing("no strike counts")
+    none = heard_of(model, tuple(silent(strike) for strike in STRIKES))
+    assert pair_spectrograms(*none) == Missing("no strike counts")
 
 
 @settings(max_examples=30, deadline=None)
@@ -199,6 +254,4 @@ def test_a_force_that_never_falls_is_counted_to_the_end() -> None:
 
 
 def test_nothing_is_said_of_a_strike_that_was_not_made() -> None:
-    line = strike_line(3, None, "not struck")
-    assert (line.contact, line.unused) == (3, "not struck")
-    assert (line.force, line.contact_time, line.pressure) == (None, None, None)
+    assert format_strike(3, None, "not struck") == ("3", "not used: not struck", NONE, NONE, NONE)

@@ -42,11 +42,10 @@ def test_of_few_presses_each_is_shown_and_of_many_those_that_double(made: int, s
 
 def test_each_estimate_is_from_the_presses_until_then_and_none_where_nothing_was_met() -> None:
     missed = replace(TOUCHES[0], points=TOUCHES[0].points[:0], normals=TOUCHES[0].normals[:0])
-    found = list(live_estimates(evidence_of((missed, *TOUCHES[1:])), "rbf"))
-    assert [one.presses for one in found] == [1, 2, 3, 4]
-    assert [len(one.evidence.touches) for one in found] == [1, 2, 3, 4]
-    assert found[0].estimate is None
-    assert all(one.estimate is not None for one in found[1:])
+    found = list(live_estimates(evidence_of((missed, *TOUCHES[1:])), RunningShape("rbf")))
+    assert [len(evidence.touches) for evidence, _ in found] == [1, 2, 3, 4]
+    assert found[0][1] is None
+    assert all(estimate is not None for _, estimate in found[1:])
 
 
 def test_a_press_that_needs_likely_shapes_waits_for_them() -> None:
@@ -64,6 +63,23 @@ def test_what_goes_on_from_press_to_press_is_the_same_where_a_run_is_taken_up_ag
     assert found is not None
     assert again is not None
     np.testing.assert_array_equal(found.mesh.vertices, again.mesh.vertices)
+
+
+def test_an_estimate_is_solved_once_and_the_answer_is_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    solved: list[int] = []
+    answer = fit_rbf(evidence_of(TOUCHES))
+
+    def estimated(_method: str, evidence: ShapeEvidence) -> ShapeEstimate:
+        solved.append(len(evidence.touches))
+        return answer
+
+    monkeypatch.setattr(explorer, "estimated", estimated)
+    shape = RunningShape(QUICK)
+    for count in (1, 2, 2):
+        shape.after(evidence_of(TOUCHES[:count]))
+    found = list(live_estimates(evidence_of(TOUCHES), shape, answer))
+    assert solved == [1, 2, 3]
+    assert found[-1][1] is answer
 
 
 def test_each_estimate_is_given_that_of_a_press_less(monkeypatch: pytest.MonkeyPatch) -> None:

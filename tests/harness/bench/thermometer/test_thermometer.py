@@ -18,11 +18,13 @@ from harness.bench.station_file import Station, load_station, station_path
 from harness.experiment.begin import begin
 from harness.experiment.experiment import Helpers
 from harness.experiment.perform import perform_on
+from harness.experiment.report_content import ReportTable
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
 from harness.recording.step_file import Step
-from harness.report.run_page import instruments
+from harness.report.run_page import list_instruments
+from harness.report.wording import rate
 from harness.tasks.bench import StationCheck
 from mocks.in_process.bench import in_process_bench
 from tests.experiments.toy.experiment import EXPERIMENT
@@ -103,13 +105,13 @@ def test_it_is_read_into_the_steps(done: Done) -> None:
 
 def test_its_health_and_the_scene_camera_s_are_in_the_report(done: Done) -> None:
     assert list(done.health) == ["arm", "gel", "camera", "thermometer"]
-    rows = instruments(done.run, done.health)
-    assert isinstance(rows, tuple)
-    named = {row.name: row for row in rows}
-    assert named["camera"].rate == done.health["camera"].rate
-    assert named["thermometer"].address == "thermometer T-7"
-    assert named["thermometer"].nominal_rate == 10.0
-    assert named["thermometer"].readings == 3 * done.run.recording.committed
+    table = list_instruments(done.run, done.health)
+    assert isinstance(table, ReportTable)
+    named = {row[0]: row for row in table.rows}
+    assert named["camera"][3] == rate(done.health["camera"].rate)
+    assert named["thermometer"][1] == "thermometer T-7"
+    assert named["thermometer"][4] == rate(10.0)
+    assert named["thermometer"][2] == str(3 * done.run.recording.committed)
 
 
 def test_check_states_how_it_does_and_what_it_reads(done: Done) -> None:

@@ -5,8 +5,7 @@ import pytest
 from matplotlib.text import Text
 
 from harness.basics.arrays import FloatArray
-from harness.report.data import ErrorCurve
-from harness.report.figures.charts import error_chart, number_marks
+from harness.report.figures.charts import ErrorCurve, error_chart, number_marks
 from harness.report.figures.style import blank
 
 

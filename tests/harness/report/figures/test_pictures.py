@@ -8,13 +8,10 @@ from hypothesis import strategies as st
 
 from harness.basics.geometry import translation
 from harness.basics.mesh import closed_hull
-from harness.report.data import BenchPart, ErrorCurve
-from harness.report.figures.charts import error_chart
-from harness.report.figures.pictures import Heat, box, cylinder
-from harness.report.figures.shading import Shot, back_projected, look_at, see
-from harness.report.figures.tiles import difference, png
-from harness.report.page import height_picture
-from harness.report.values import Posterior
+from harness.report.figures.charts import ErrorCurve, error_chart
+from harness.report.figures.pictures import Heat, Posterior, box, cylinder
+from harness.report.figures.shading import BenchPart, Shot, back_projected, look_at, see
+from harness.report.figures.tiles import difference, height_picture, png
 from harness.report.wording import duration, millimetres
 
 CAMERA = look_at(np.zeros(3), 0.7, 0.4, 0.2, 90, 120)

@@ -10,11 +10,11 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.basics.arrays import AnyArray, FloatArray
+from harness.experiment.report_content import Missing
 from harness.objects.household import build
 from harness.report.figures.figures import Album
-from harness.report.figures.pictures import close_up, object_sides
+from harness.report.figures.pictures import Posterior, close_up, object_sides
 from harness.report.figures.sound import senses_figure, spectrogram_pair
-from harness.report.values import Missing, Posterior
 
 TIMES = np.linspace(0.01, 0.39, 40)
 FREQUENCIES = np.linspace(0.0, 12_000.0, 120)
