@@ -76,6 +76,8 @@ def format_key(key: str, value: object) -> tuple[str, str, str]:
         # Four digits of the greatest; adding zero removes the sign of a zero.
         digits = 3 - int(np.floor(np.log10(max(float(np.abs(scaled).max()), 1e-12))))
         return name, f"({', '.join(f'{number:g}' for number in np.round(scaled, digits) + 0.0)})", unit
+    if isinstance(value, bool):
+        return name, "yes" if value else "no", unit
     if isinstance(value, float):
         return name, f"{factor * value + 0.0:.4g}", unit
     return name, str(value)[:_HASH] if key.endswith("sha256") else str(value), unit
