@@ -44,7 +44,11 @@ WIRES: Final = (
 LONG: Final = (
     "wires",
     "runs/test_wheel.py",
+    "runs/test_read_once.py",
     "runs/test_hostile_meshes.py",
+    "runs/test_written_at_bc239515.py",
+    "hard_cases/test_sound_hard_cases.py",
+    "hard_cases/test_hostile_text.py",
     "runs/test_budget.py",
 )
 """Groups that take longest: they begin first, so that none is left when the other workers have ended."""
