@@ -1,13 +1,12 @@
-"""The tactile image of a press: python examples/image_of_a_press.py OUT.png."""
+"""The tactile image of a press, and the depth read from it: python examples/image_of_a_press.py OUT.png."""
 
 import sys
-
-import cv2
+from pathlib import Path
 
 import touchstone
 
-press = touchstone.tactile_image("builtin:mug", contact=(-0.04, 0.0, 0.05), depth=0.8e-3, tilt=0.1)
-cv2.imwrite(sys.argv[1], press.image[..., ::-1])
-print(
-    f"{press.image.shape}, {1e3 * press.deepest:.2f} mm deep; {sum(press.evaluation.seconds.values()):.3f} s"
-)
+out = Path(sys.argv[1])
+touch = touchstone.render_touch("builtin:wrench", vertex=50, depth=0.5e-3, out=out)
+print("\n".join(touch.summary()))
+print(f"{touch.press.image.shape}, error of the colours {touch.error_estimate.held_out_table_db:.0f} dB")
+print("\n".join(touchstone.depth([out], calibration="gelsight_r15_bench").summary()))

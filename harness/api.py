@@ -22,45 +22,46 @@ if TYPE_CHECKING:
         load_object,
         verify_object,
     )
-    from harness.tasks.runs import answer
-    from harness.tasks.touch import tactile_image
+    from harness.tasks.runs import ComparedRun, RunResult, RunWatcher, answer, compare, replay, run
+    from harness.tasks.scenes import SceneOptions
+    from harness.tasks.touch import RenderedTouch, render_touch, tactile_image
     from harness.tasks.vision import ComparedVision, RenderedVision, compare_vision, render_vision
 
-_HOMES = {
-    "AudioBuild": "harness.tasks.objects",
-    "ComparedVision": "harness.tasks.vision",
-    "PressDepth": "harness.tasks.depth",
-    "RenderedAudio": "harness.tasks.audio",
-    "RenderedVision": "harness.tasks.vision",
-    "StationCheck": "harness.tasks.bench",
-    "TakenPicture": "harness.tasks.bench",
-    "TaximResult": "calibration.taxim.result",
-    "TouchBuild": "harness.tasks.objects",
-    "VerifiedObject": "harness.tasks.objects",
-    "VisionBuild": "harness.tasks.objects",
-    "answer": "harness.tasks.runs",
-    "build_objectfile": "harness.tasks.objects",
-    "calibrate_taxim": "calibration.taxim.result",
-    "check_station": "harness.tasks.bench",
-    "compare_vision": "harness.tasks.vision",
-    "depth": "harness.tasks.depth",
-    "load_object": "harness.tasks.objects",
-    "modes": "harness.tasks.modes",
-    "open_station": "harness.tasks.bench",
-    "render_audio": "harness.tasks.audio",
-    "render_vision": "harness.tasks.vision",
-    "tactile_image": "harness.tasks.touch",
-    "take_picture": "harness.tasks.bench",
-    "verify_object": "harness.tasks.objects",
+_NAMES = {
+    "calibration.taxim.result": ("TaximResult", "calibrate_taxim"),
+    "harness.tasks.audio": ("RenderedAudio", "render_audio"),
+    "harness.tasks.bench": ("StationCheck", "TakenPicture", "check_station", "open_station", "take_picture"),
+    "harness.tasks.depth": ("PressDepth", "depth"),
+    "harness.tasks.modes": ("modes",),
+    "harness.tasks.objects": (
+        "AudioBuild",
+        "TouchBuild",
+        "VerifiedObject",
+        "VisionBuild",
+        "build_objectfile",
+        "load_object",
+        "verify_object",
+    ),
+    "harness.tasks.runs": ("ComparedRun", "RunResult", "RunWatcher", "answer", "compare", "replay", "run"),
+    "harness.tasks.scenes": ("SceneOptions",),
+    "harness.tasks.touch": ("RenderedTouch", "render_touch", "tactile_image"),
+    "harness.tasks.vision": ("ComparedVision", "RenderedVision", "compare_vision", "render_vision"),
 }
-"""Name to the module that defines it."""
+"""Module to the names that it defines."""
+
+_HOMES = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [
     "AudioBuild",
+    "ComparedRun",
     "ComparedVision",
     "PressDepth",
     "RenderedAudio",
+    "RenderedTouch",
     "RenderedVision",
+    "RunResult",
+    "RunWatcher",
+    "SceneOptions",
     "StationCheck",
     "TakenPicture",
     "TaximResult",  # noqa: F822 - above the core, so that no import names it
@@ -71,13 +72,17 @@ __all__ = [
     "build_objectfile",
     "calibrate_taxim",  # noqa: F822 - above the core, so that no import names it
     "check_station",
+    "compare",
     "compare_vision",
     "depth",
     "load_object",
     "modes",
     "open_station",
     "render_audio",
+    "render_touch",
     "render_vision",
+    "replay",
+    "run",
     "tactile_image",
     "take_picture",
     "verify_object",

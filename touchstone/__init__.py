@@ -8,60 +8,12 @@ from typing import TYPE_CHECKING, Any
 from harness import api
 
 if TYPE_CHECKING:
-    from calibration.taxim.result import TaximResult, calibrate_taxim
-    from harness.api import (
-        AudioBuild,
-        ComparedVision,
-        PressDepth,
-        RenderedAudio,
-        RenderedVision,
-        StationCheck,
-        TakenPicture,
-        TouchBuild,
-        VerifiedObject,
-        VisionBuild,
-        answer,
-        build_objectfile,
-        check_station,
-        compare_vision,
-        depth,
-        load_object,
-        modes,
-        open_station,
-        render_audio,
-        render_vision,
-        tactile_image,
-        take_picture,
-        verify_object,
-    )
+    from calibration.taxim.result import TaximResult as TaximResult
+    from calibration.taxim.result import calibrate_taxim as calibrate_taxim
+    from harness.api import *  # noqa: F403 - the names of its __all__
 
-__all__ = [
-    "AudioBuild",
-    "ComparedVision",
-    "PressDepth",
-    "RenderedAudio",
-    "RenderedVision",
-    "StationCheck",
-    "TakenPicture",
-    "TaximResult",
-    "TouchBuild",
-    "VerifiedObject",
-    "VisionBuild",
-    "answer",
-    "build_objectfile",
-    "calibrate_taxim",
-    "check_station",
-    "compare_vision",
-    "depth",
-    "load_object",
-    "modes",
-    "open_station",
-    "render_audio",
-    "render_vision",
-    "tactile_image",
-    "take_picture",
-    "verify_object",
-]
+__all__: list[str] = []
+__all__ += api.__all__
 
 
 def __getattr__(name: str) -> Any:

@@ -8,7 +8,7 @@ import typer
 
 from harness.basics.errors import WrongUse
 from harness.commands import options
-from harness.commands.output import CONSOLE, print_result, resumable, step_progress, stopped
+from harness.commands.output import CONSOLE, print_result, stopped
 
 if TYPE_CHECKING:
     from calibration.taxim.pictures import Channels
@@ -176,8 +176,9 @@ def taxim(
 
     Or: touchstone calibrate taxim presses/ --ball-radius 2mm --pitch 0.1245mm --report page/
     """
-    from calibration.taxim.result import calibrate_taxim
+    from harness import api
     from harness.basics.quantities import LENGTH
+    from harness.tasks.runs import RunStopped
 
     options.require_files(
         ("--out", out, ""), ("--polycalib", polycalib, ""), ("--shadow-table", shadow_table, "")
@@ -196,10 +197,11 @@ def taxim(
         bench,
     )
     chosen(folder, wanted)
-    source = folder if folder is not None else pressed(wanted, json)
-    if source is None:
-        return 130
-    calibrated = calibrate_taxim(
+    try:
+        source = folder if folder is not None else pressed(wanted, json)
+    except RunStopped as stop:
+        return stopped(stop, stop.folder, json)
+    calibrated = api.calibrate_taxim(
         source,
         ball_radius=wanted.ball_radius,
         pitch=options.positive("--pitch", pitch, LENGTH),
@@ -271,35 +273,24 @@ def chosen(folder: Path | None, wanted: PressRequest) -> None:
         wanted.require_none()
 
 
-def pressed(wanted: PressRequest, as_json: bool) -> Path | None:
-    """The folder of the run that the arm made or went on with; None where Ctrl-C ended it early."""
+def pressed(wanted: PressRequest, as_json: bool) -> Path:
+    """Let the arm press, or go on with a run, and return its folder; ``RunStopped`` if Ctrl-C ended it."""
     from calibration.taxim.arm.press import procedure
     from calibration.taxim.arm.record import NAME
+    from harness.commands.run.watcher import TerminalWatcher
     from harness.experiment.lookup import require_of
-    from harness.experiment.perform import describe_bench, perform_on_bench, steps_planned
     from harness.recording.recording import Recording
     from harness.recording.run_folder import RunFiles
+    from harness.tasks.runs import perform_run
 
     if wanted.resume is None:
         recording = _begun(wanted)
     else:
         recording = Recording(wanted.resume)
         require_of(recording, NAME, "--resume")
-    presses = procedure()
-    total = steps_planned(presses, recording)
-    if recording.committed < total:
-        CONSOLE.print(f"bench: {describe_bench(recording)}", markup=False)
-        CONSOLE.print(f"recording to {recording.folder}", markup=False)
-        how = f"touchstone calibrate taxim --resume {recording.folder}"
-        with (
-            recording.hold(),
-            resumable(how),
-            step_progress(recording.committed, total, presses.step) as told,
-        ):
-            done = perform_on_bench(presses, RunFiles(recording), told, say=told.say)
-        if not done.complete:
-            stopped(f"{presses.step} {recording.committed}", recording.folder, how, as_json)
-            return None
+    how = f"touchstone calibrate taxim --resume {recording.folder}"
+    with recording.hold():
+        perform_run(procedure(), RunFiles(recording), how, TerminalWatcher(as_json))
     return recording.folder
 
 

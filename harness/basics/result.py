@@ -5,8 +5,9 @@ gives every field with a name and a unit that people use: ``edge_m = 0.004`` is 
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
@@ -48,23 +49,28 @@ class Result:
         """Return the answer in words, a sentence each."""
         return ()
 
+    def tables(self) -> Iterable["TextTable"]:
+        """Return the tables of the text: records, and names mapped to mappings."""
+        return text_tables(self)
+
     def as_json(self) -> dict[str, JsonValue]:
         """Return the fields as JSON values; a number that is not finite is None."""
         return {"schema": self.schema, **_object(self)}
 
 
-def text_columns(result: Result) -> dict[str, list[str]]:
-    """Return the vectors of a result as columns of text, by heading with unit."""
-    return {
-        " ".join(filter(None, heading(name))): [number_text(name, item) for item in value]
-        for name, value in _shown(result)
-        if isinstance(value, np.ndarray) and value.ndim == 1
-    }
+TextTable: TypeAlias = tuple[str, list[str], list[list[str]]]
+"""Title, headings and rows."""
 
 
-def text_tables(result: Result) -> Iterator[tuple[str, list[str], list[list[str]]]]:
-    """Yield title, headings and rows of every field that maps names to mappings, such as errors by method."""
-    for name, value in _shown(result):
+def text_tables(result: Result) -> Iterator[TextTable]:
+    """Yield the vectors as one table, then every field that holds records or maps names to mappings."""
+    shown = list(_shown(result))
+    vectors = {name: value for name, value in shown if isinstance(value, np.ndarray) and value.ndim == 1}
+    if vectors:
+        columns = [[number_text(name, item) for item in value] for name, value in vectors.items()]
+        headings = [" ".join(filter(None, heading(name))) for name in vectors]
+        yield "", headings, [list(row) for row in zip_longest(*columns, fillvalue="")]
+    for name, value in shown:
         if _is_table(value):
             leaves = list(_leaves(value, ()))
             keys = list(dict.fromkeys(key for _, leaf in leaves for key in leaf))
@@ -76,6 +82,23 @@ def text_tables(result: Result) -> Iterator[tuple[str, list[str], list[list[str]
                 for path, leaf in leaves
             ]
             yield heading(name)[0], ["", *(key.replace("_", " ") for key in keys)], rows
+        elif value and _is_records(value):
+            printed = [item.name for item in fields(value[0]) if item.metadata.get("text", True)]
+            # A column that no record fills is left out.
+            keys = [key for key in printed if any(vars(each)[key] not in (None, "", ()) for each in value)]
+            rows = [[_cell(key, vars(each)[key]) for key in keys] for each in value]
+            yield heading(name)[0], [" ".join(filter(None, heading(key))) for key in keys], rows
+
+
+def _is_records(value: object) -> bool:
+    return isinstance(value, tuple | list) and all(is_dataclass(each) for each in value)
+
+
+def _cell(name: str, value: Any) -> str:
+    """Format a value under a heading that has the unit."""
+    if value is None:
+        return ""
+    return number_text(name, value, 4) if isinstance(value, float) else _text(name, value)
 
 
 def _is_table(value: object) -> bool:
@@ -95,7 +118,8 @@ def _leaves(
 def text_rows(result: Result) -> Iterator[tuple[str, str]]:
     """Yield label and value of every other field that text shows."""
     for name, value in _shown(result):
-        if value is not None and not isinstance(value, np.ndarray) and not _is_table(value):
+        listed = isinstance(value, np.ndarray) or _is_table(value) or _is_records(value)
+        if value is not None and not listed:
             yield heading(name)[0], _text(name, value)
 
 

@@ -53,6 +53,9 @@ EXPERIMENTS: dict[str, ExperimentRow] = {
 }
 """By the name that a run's folder carries."""
 
+DEFAULT_EXPERIMENT = "contact-localization"
+"""Experiment of a run for which none is named."""
+
 
 def experiment_names() -> tuple[str, ...]:
     """Return the name of every experiment, in the order of the table."""

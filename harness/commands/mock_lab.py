@@ -32,8 +32,8 @@ def mock_lab(
     from harness.bench.gap import gap_path
     from harness.bench.mock_lab import MockLab
     from harness.bench.station_file import load_station, station_path
-    from harness.commands.scenes import SceneOptions, resolve
     from harness.effects.scene_object import known_object
+    from harness.tasks.scenes import SceneOptions, resolve
 
     default = "builtin:mug" if scene is None and object_ is None else object_
     wanted = resolve(SceneOptions(scene, default, material, units, up_axis=up_axis))

@@ -128,9 +128,7 @@ Material = Annotated[
 ]
 Units = Annotated[
     str | None,
-    typer.Option(
-        "--units", help="Of the mesh file's numbers: m, cm, mm, um, in or ft (with --object).", metavar="U"
-    ),
+    typer.Option("--units", help="Unit of the mesh coordinates: m, cm, mm, um, in or ft.", metavar="U"),
 ]
 UpAxis = Annotated[
     str | None,
@@ -143,7 +141,7 @@ UpAxis = Annotated[
 ]
 Wall = Annotated[
     str | None,
-    typer.Option("--wall", help="Wall of a hollow thing scanned as a solid, as 2mm.", metavar="LENGTH"),
+    typer.Option("--wall", help="Wall of a hollow object scanned as a solid, e.g. 2mm.", metavar="L"),
 ]
 ObjectFileOption = Annotated[
     str | None,
@@ -229,6 +227,12 @@ ErrorWanted = Annotated[
         metavar="LENGTH",
     ),
 ]
+WhereOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Only this level of a condition, as spacing=close; may be given again.", metavar="NAME=LEVEL"
+    ),
+]
 Json = Annotated[
     bool, typer.Option("--json", help="One JSON object on standard output; the rest on standard error.")
 ]
@@ -254,6 +258,14 @@ def quantity(option: str, text: str | None, kind: "Dimension") -> float | None:
         return kind.parse(text)
     except ValueError as refused:
         raise WrongUse(f"{option}: {refused}") from None
+
+
+@overload
+def positive(option: str, text: str, kind: "Dimension") -> float: ...
+
+
+@overload
+def positive(option: str, text: str | None, kind: "Dimension") -> float | None: ...
 
 
 def positive(option: str, text: str | None, kind: "Dimension") -> float | None:

@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from itertools import count, islice, zip_longest
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,6 @@ from rich.progress import (
     TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
-    TimeRemainingColumn,
 )
 from rich.table import Table
 
@@ -60,7 +59,7 @@ def print_result(result: "Result", as_json: bool) -> None:
 
     Text is the answer in words, a table of the vectors, and every other field with its unit.
     """
-    from harness.basics.result import text_columns, text_rows, text_tables
+    from harness.basics.result import text_rows
 
     notes: Sequence[str] = getattr(result, "notes", ())
     for sentence in notes:
@@ -70,20 +69,13 @@ def print_result(result: "Result", as_json: bool) -> None:
         return
     for sentence in result.summary():
         ANSWERS.print(sentence, markup=False)
-    columns = text_columns(result)
-    if columns:
-        table = Table(*columns)
-        length = max(map(len, columns.values()))
-        for cells in islice(zip_longest(*columns.values(), fillvalue=""), MAX_ROWS):
-            table.add_row(*cells)
+    for title, headings, lines in result.tables():
+        table = Table(*headings, title=title or None)
+        for line in lines[:MAX_ROWS]:
+            table.add_row(*map(escape, line))
         ANSWERS.print(table)
-        if length > MAX_ROWS:
-            ANSWERS.print(f"... and {length - MAX_ROWS} more rows; --json has all")
-    for title, headings, lines in text_tables(result):
-        table = Table(*headings, title=title)
-        for line in lines:
-            table.add_row(*line)
-        ANSWERS.print(table)
+        if len(lines) > MAX_ROWS:
+            ANSWERS.print(f"... and {len(lines) - MAX_ROWS} more rows; --json has all")
     rows = list(text_rows(result))
     width = max((len(label) for label, _ in rows), default=0)
     for label, value in rows:
@@ -95,23 +87,13 @@ def warn(sentence: str) -> None:
     CONSOLE.print(f"[yellow]note:[/] {escape(escape_message(sentence))}")
 
 
-@contextmanager
-def resumable(how: str) -> Iterator[None]:
-    """Where a bench fails within it, say with which command the run goes on; the failure is raised on."""
-    try:
-        yield
-    except TouchstoneError:
-        warn(f"what was recorded is kept; go on with `{how}`")
-        raise
-
-
-def stopped(step: str, folder: Path, how: str, as_json: bool) -> int:
-    """Ctrl-C ended a session after a step: say with which command the run goes on; the exit code."""
-    said = f"stopped after {step}; go on with `{how}`"
-    CONSOLE.print(said, markup=False)
+def stopped(stop: TouchstoneError, folder: Path, as_json: bool) -> int:
+    """Print that Ctrl-C ended a session after a step, and how to resume it; return the exit code."""
+    CONSOLE.print(str(stop), markup=False)
     if as_json:
-        emit({"schema": 1, "error": said, "kind": "interrupted", "exit_code": 130, "recording": str(folder)})
-    return 130
+        kind = {"kind": "interrupted", "exit_code": stop.exit_code, "recording": str(folder)}
+        emit({"schema": 1, "error": str(stop), **kind})
+    return stop.exit_code
 
 
 class Pace:
@@ -198,24 +180,14 @@ def step_progress(done: int, total: int, noun: str = "step") -> Iterator[StepPro
 
 @contextmanager
 def run_progress(total: int) -> Iterator[Callable[[], None]]:
-    """A progress bar over many runs, and what counts one as done; lines where there is no terminal."""
-    columns = (
-        TextColumn("runs"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("left:"),
-        TimeRemainingColumn(),
-    )
-    pace, done = Pace(), count(1)
-    with Progress(*columns, console=CONSOLE, transient=True) as bar:
-        task = bar.add_task("runs", total=total)
+    """Show how many of many runs are finished; the yielded function counts one."""
+    finished = count(1)
+    with share_progress() as report:
 
         def advance() -> None:
-            bar.advance(task)
-            at = next(done)
-            _print_line(pace, f"run {at} of {total}", at / total)
+            at = next(finished)
+            report(f"run {at} of {total}", at / total)
 
-        pace.left(0.0)
         yield advance
 
 

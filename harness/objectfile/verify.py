@@ -55,22 +55,22 @@ _OPAQUE = 0.5
 
 
 @dataclass(frozen=True)
-class Check:
-    """One thing that was looked at."""
+class ObjectCheck:
+    """One check of an ObjectFile."""
 
-    name: str  #: of it.
-    passed: bool  #: whether it holds.
-    said: str  #: what was found; where it does not hold, what to do.
+    check: str  #: name of the check.
+    passed: bool
+    said: str  #: finding; where the check failed, what to do.
 
 
-def verify(of: Either) -> list[Check]:
+def verify(of: Either) -> list[ObjectCheck]:
     """Look at everything; a failure ends its own check alone. An import has no mesh to look at."""
     checks = []
     for name, look in _looks(of):
         try:
-            checks.append(Check(name, True, look()))
+            checks.append(ObjectCheck(name, True, look()))
         except TouchstoneError as error:
-            checks.append(Check(name, False, str(error)))
+            checks.append(ObjectCheck(name, False, str(error)))
     return checks
 
 

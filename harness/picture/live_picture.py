@@ -1,5 +1,6 @@
 """A camera's picture beside the simulated one of the same pose: masks, exposure, and what is left."""
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,12 +24,16 @@ _EDGE = 1
 
 
 @dataclass(frozen=True, eq=False)
-class Apart:
-    """How far two pictures are apart over the object's silhouette."""
+class PictureDifference:
+    """Difference of two pictures over the object's silhouette."""
 
     psnr_db: float  #: in dB; infinite where they are the same.
     ssim: float  #: mean of the structural similarity of its pixels.
     rms_grey: float  #: root of the mean square, grey levels.
+
+    def __str__(self) -> str:
+        decibels = f"{self.psnr_db:.1f} dB" if math.isfinite(self.psnr_db) else "the same"
+        return f"{decibels}, SSIM {self.ssim:.3f}, {self.rms_grey:.1f} grey levels rms"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +49,8 @@ class LiveComparison:
     masked_by: str  #: ``"background"`` or ``"colours"``.
     overlap: float  #: of both, 0 to 1 (IoU).
     exposure: ExposureFit  #: the fit.
-    fitted: Apart  #: how far they are apart over the silhouette.
-    unfitted: Apart  #: the same before anything was fitted.
+    fitted: PictureDifference  #: over the silhouette.
+    unfitted: PictureDifference  #: the same before anything was fitted.
     seconds: Mapping[str, float]  #: s on the clock by stage.
 
 
@@ -108,8 +113,8 @@ def _before(colour: FloatArray, alpha: FloatArray, behind: FloatArray) -> ByteAr
     return bytes_from_linear(np.clip(colour, 0.0, None) + (1.0 - alpha)[..., None] * behind)
 
 
-def _apart(live: ByteArray, simulated: ByteArray, where: BoolArray) -> Apart:
-    return Apart(
+def _apart(live: ByteArray, simulated: ByteArray, where: BoolArray) -> PictureDifference:
+    return PictureDifference(
         psnr(live, simulated, where),
         ssim(live, simulated, where),
         float(np.sqrt(mean_square(live, simulated, where))),

@@ -1,5 +1,6 @@
 """ObjectFiles: opened, checked and built."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,9 +21,10 @@ from harness.basics.result import HIDDEN, JSON_ONLY, JsonValue, Result
 from harness.basics.store import Store, default_folder
 from harness.bench.scene_objectfile import find_objectfile
 from harness.bench.sensor import DEFAULT_MAKE, described_sensor
+from harness.objectfile.description import Description
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.published.entries import PublishedObject, open_either
-from harness.objectfile.verify import verify
+from harness.objectfile.published.entries import PublishedDescription, PublishedObject, open_either
+from harness.objectfile.verify import ObjectCheck, verify
 from harness.sim.modal.modal import HEARING
 from harness.sim.modal.solve import cpu, wall
 
@@ -42,13 +44,100 @@ def load_object(folder: str | Path) -> ObjectFile | PublishedObject:
     return open_either(find_objectfile(folder))
 
 
-@dataclass(frozen=True)
-class ObjectCheck:
-    """One check of an ObjectFile."""
+@dataclass(frozen=True, eq=False)
+class ObjectInfo(Result):
+    """The content of an ``object.json``."""
 
-    check: str  #: name of the check.
-    passed: bool
-    said: str  #: finding; where the check failed, what to do.
+    folder: Path = field(metadata=JSON_ONLY)
+    description: Description | PublishedDescription = field(metadata=HIDDEN)
+
+    def as_json(self) -> dict[str, JsonValue]:
+        """Return the folder, and the content of the file."""
+        return {"folder": str(self.folder), **self.description.model_dump(mode="json", by_alias=True)}
+
+    def summary(self) -> tuple[str, ...]:
+        """List the object, its senses and its networks."""
+        return tuple(describe_object(self.description))
+
+
+def describe_object(of: Description | PublishedDescription) -> list[str]:
+    """Describe the object, its senses and its networks, a line each."""
+    if isinstance(of, PublishedDescription):
+        return _published_lines(of)
+    mesh, material, audio, touch, vision = of.mesh, of.material, of.audio, of.touch, of.vision
+    size = " x ".join(f"{(b - a) * 1e3:.4g}" for a, b in zip(mesh.low_m, mesh.high_m, strict=True))
+    lines = [
+        f"{of.name}, of {material.name}",
+        f"  mesh      {mesh.file}: {mesh.vertices} vertices, {mesh.faces} faces, {size} mm",
+        f"  material  {material.density_kg_per_m3:g} kg/m3, E = {material.young_pa:g} Pa, "
+        f"nu = {material.poisson:g}, alpha = {material.rayleigh_alpha_per_s:g}/s, "
+        f"beta = {material.rayleigh_beta_s:g} s",
+        f"  licence   {of.provenance.licence}",
+    ]
+
+    def part(label: str, file: str, size: int, measured: Mapping[str, float] | None) -> None:
+        errors = "".join(f"; {name} {number:.4g}" for name, number in (measured or {}).items())
+        lines.append(f"    {label:<7} {file}, {size / 1e6:.2f} MB{errors}")
+
+    lines += [
+        f"  {name:<9} none yet" for name, sense in (("audio", audio), ("touch", touch)) if sense is None
+    ]
+    if audio is not None:
+        low, high = audio.frequencies_hz[0], audio.frequencies_hz[-1]
+        lines.append(
+            f"  audio     {len(audio.frequencies_hz)} modes, {low:.5g} to {high:.5g} Hz, all up to "
+            f"{audio.complete_up_to_hz:.5g} Hz; {audio.mass_kg:.4g} kg; queries within "
+            f"{audio.near_surface_m * 1e3:g} mm of the surface"
+        )
+        if audio.network is not None:
+            part("network", audio.network.file, audio.network.bytes, audio.network.measured)
+        if audio.table is not None:
+            size_of_table = audio.table.bytes + audio.table.surface.bytes
+            part("table", audio.table.file, size_of_table, audio.table.measured)
+    if touch is None:
+        lines.append("  touch     none yet")
+    else:
+        gel, (shallow, deep) = touch.gel, touch.depth_m
+        lines.append(
+            f"  touch     {gel.name}, {gel.rows} x {gel.columns}; {shallow * 1e3:g} to {deep * 1e3:g} mm "
+            f"deep, tilts to {math.degrees(touch.most_tilt_rad):g} deg"
+        )
+        if touch.codes is not None:
+            network = touch.codes.network
+            part("codes", network.file, network.bytes + touch.codes.nodes.bytes, network.measured)
+        if touch.perceptron is not None:
+            part("perceptron (not rendered)", touch.perceptron.file, touch.perceptron.bytes, None)
+    if vision is None:
+        return [*lines, "  vision    none yet"]
+    lines.append(
+        f"  vision    {vision.level}: {vision.grid.networks} networks {vision.size.width} wide, in cubes of "
+        f"{vision.grid.cell_m * 1e3:.4g} mm; {vision.colour}, camera as {vision.camera}"
+    )
+    part("network", vision.network.file, vision.network.bytes, vision.network.measured)
+    return lines
+
+
+def _published_lines(of: PublishedDescription) -> list[str]:
+    """Describe imported networks: the source, the tables of each sense, and what the file did not hold."""
+    source = of.provenance.sources[0]
+    lines = [
+        f"{of.name}, imported from {source.origin} ({of.format})",
+        f"  sha256    {source.sha256}",
+        f"  licence   {of.provenance.licence}",
+    ]
+    for sense in ("audio_gains", "audio_spectrum", "touch_depth", "touch_colours", "vision"):
+        tables = []
+        for key, value in getattr(of, sense) or ():
+            if isinstance(value, tuple) and len(value) > 3:
+                tables.append(f"{len(value)} {key} from {min(value):.5g} to {max(value):.5g}")
+            elif isinstance(value, tuple | float | int | str):
+                tables.append(f"{key} {value}")
+        if tables:
+            lines.append(f"  {sense}: {'; '.join(tables)}")
+    dropped = sum(of.dropped.values())
+    if dropped:
+        lines.append(f"  dropped   {dropped} weights in {len(of.dropped)} layers that nothing uses")
+    return [*lines, *(f"  lacks     {sentence}" for sentence in of.missing)]
 
 
 @dataclass(frozen=True)
@@ -76,7 +165,7 @@ def verify_object(folder: str | Path) -> VerifiedObject:
         WrongUse: there is no ObjectFile.
         DataRefused: its ``object.json`` is damaged or of another version.
     """
-    checks = tuple(ObjectCheck(check.name, check.passed, check.said) for check in verify(load_object(folder)))
+    checks = tuple(verify(load_object(folder)))
     return VerifiedObject(Path(folder), all(check.passed for check in checks), checks)
 
 

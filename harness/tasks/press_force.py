@@ -3,8 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from harness.effects.touch_press import Press
 from harness.sim.gel.contact_force import CHECKED, PARTS, ContactForce
 from harness.sim.gel.elastic import NOT_MEASURED, GelElastic
+
+FORCE_LEVEL = "touch.force"
+"""Knob of the model of the force."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,23 @@ def force_notes(found: ContactForce, gel: GelElastic | None, bound: bool) -> lis
             f"--gel-modulus, {gel.young:g} Pa times measured over computed"
         )
     return notes
+
+
+def force_of_press(press: Press) -> tuple[float | None, float | None, PressForce | None, list[str]]:
+    """Return newtons, their standard deviation, details and warnings; None where no force was computed."""
+    found = press.force
+    if found is None:
+        return None, None, None, []
+    level = str(press.plan.levels[FORCE_LEVEL])
+    gel = None if level == "table" else press.gel.elastic
+    table = press.gel.forces
+    source = (
+        None if table is None else f"{table.indenter} on {table.sensor} {table.serial}: {table.made_from}"
+    )
+    missing = press.missing is not None and bool(press.missing.any())
+    bound = missing or bool(found.lower_bound[0])
+    force = describe_force(found, level, gel, bound, source)
+    return float(found.newtons[0]), float(found.uncertainty[0]), force, force_notes(found, gel, bound)
 
 
 def force_sentence(newtons: float, uncertainty: float) -> str:

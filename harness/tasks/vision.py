@@ -24,7 +24,7 @@ from harness.objectfile.vision.view import camera_for, light_for, require_size, 
 from harness.picture.exposure_fit import exposure_kind
 from harness.picture.image_file import read_image, write_png
 from harness.picture.linear_image import LinearImage
-from harness.picture.live_picture import Apart, LiveComparison, compare_live
+from harness.picture.live_picture import LiveComparison, PictureDifference, compare_live
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.solid.walls import walled
 
@@ -291,24 +291,6 @@ class OutlineMatch:
     overlap: float  #: intersection over union.
 
 
-@dataclass(frozen=True)
-class PictureDifference:
-    """Difference of two pictures over the object."""
-
-    psnr_db: float  #: infinite for equal pictures.
-    ssim: float
-    rms_grey: float  #: grey levels of 255.
-
-    def __str__(self) -> str:
-        decibels = f"{self.psnr_db:.1f} dB" if math.isfinite(self.psnr_db) else "the same"
-        return f"{decibels}, SSIM {self.ssim:.3f}, {self.rms_grey:.1f} grey levels rms"
-
-    @classmethod
-    def of(cls, apart: Apart) -> "PictureDifference":
-        """Take the numbers of a comparison."""
-        return cls(apart.psnr_db, apart.ssim, apart.rms_grey)
-
-
 @dataclass(frozen=True, eq=False)
 class ComparedVision(Result):
     """A camera's picture of an object, compared with the simulated one."""
@@ -461,8 +443,8 @@ def compare_vision(
             outlier_share=exposure.outliers,
         ),
         mask=OutlineMatch(found.masked_by, int(found.mask.sum()), int(found.silhouette.sum()), found.overlap),
-        difference=PictureDifference.of(found.fitted),
-        difference_before_fit=PictureDifference.of(found.unfitted),
+        difference=found.fitted,
+        difference_before_fit=found.unfitted,
         notes=_notes(found, photo.light_assumed),
         seconds={**seconds, **found.seconds},
         comparison=found,
@@ -538,7 +520,6 @@ def _draw(found: LiveComparison, out: Path) -> None:
     words = (
         f"object found by {found.masked_by} (orange), simulated (blue)\noverlap {found.overlap:.1%}",
         f"red, green, blue:\ngain {gains}\noffset {offsets}",
-        f"over the object: {PictureDifference.of(found.fitted)}\n"
-        f"before the fit: {PictureDifference.of(found.unfitted)}",
+        f"over the object: {found.fitted}\nbefore the fit: {found.unfitted}",
     )
     Album(out.parent).photograph(out.stem, live_figure(found, words))

@@ -1,22 +1,51 @@
 """The scripts under examples/ run as they stand, and say what the functions of ``harness.api`` return."""
 
 import os
+import re
 import subprocess
 import sys
+from inspect import isfunction
 from pathlib import Path
 
 import nbformat
+import numpy as np
 import pytest
 from nbclient import NotebookClient
 
 import touchstone
 from harness import api
 from harness.api import answer, tactile_image
-from harness.basics.errors import OutOfDomain, WrongUse
+from harness.basics.errors import OutOfDomain, TouchstoneError, WrongUse
+from harness.cli import invoke
+from harness.picture.image_file import write_png
+from tests.samples.drawn_presses import drawn_set
 from tests.support.whole_run import in_process_run, touch_scene
 
 ROOT = Path(__file__).parents[2]
 SCRIPTS = sorted((ROOT / "examples").glob("*.py"))
+FUNCTIONS = [name for name in api.__all__ if isfunction(getattr(api, name))]
+COMMANDS = {
+    "build_objectfile": "object build builtin:bowl --material ceramic --out bowl",
+    "calibrate_taxim": "calibrate taxim . --ball-radius 2mm --pitch 0.1mm",
+    "check_station": "check",
+    "compare": "compare run",
+    "compare_vision": "object compare vision mug --live a.png --camera 0.2 0 0",
+    "depth": "depth a.png --calibration gelsight_r15_bench",
+    "load_object": "object info mug",
+    "modes": "sim modes builtin:bowl --material ceramic",
+    "open_station": "check",
+    "render_audio": "object render audio mug --vertex 0 --out a.wav",
+    "render_touch": "sim touch builtin:mug --vertex 0 --out b.png",
+    "render_vision": "object render vision mug --out b.png",
+    "replay": "replay run",
+    "run": "run --object mug",
+    "take_picture": "camera gel --out b.png",
+    "verify_object": "object verify mug",
+}
+"""A command for each function of the API."""
+
+HOMES = {"open_station": "harness.tasks.bench"}
+"""Modules through which a command reaches a function that it does not name itself."""
 
 
 def run(name: str, *arguments: str) -> str:
@@ -43,9 +72,11 @@ def test_modes_of_a_mesh_are_listed_with_what_they_took() -> None:
     assert lines[-1].startswith("none is missing: True")
 
 
-def test_a_press_is_drawn_to_a_file(tmp_path: Path) -> None:
+def test_a_press_is_drawn_to_a_file_and_its_depth_is_read_again(tmp_path: Path) -> None:
     said = run("image_of_a_press.py", str(tmp_path / "press.png"))
     assert "(120, 160, 3)" in said
+    drawn, read = (float(text) for text in re.findall(r"([\d.]+) mm at the deepest", said))
+    assert read == pytest.approx(drawn, rel=0.2)
     assert (tmp_path / "press.png").stat().st_size > 1000
 
 
@@ -58,7 +89,80 @@ def test_a_strike_is_written_as_a_sound(tmp_path: Path) -> None:
 def test_an_object_is_drawn_by_its_networks(tmp_path: Path) -> None:
     said = run("picture_of_an_object.py", str(tmp_path / "a.png"), "mug")
     assert "160 x 120 pixels" in said
+    assert float(re.findall(r"SSIM ([\d.]+)", said)[0]) > 0.98
     assert (tmp_path / "a.png").stat().st_size > 1000
+
+
+def test_a_run_is_made_replayed_and_compared(tmp_path: Path) -> None:
+    said = run("run_on_a_bench.py", str(tmp_path / "run"))
+    assert "touch against the " in said
+    assert (tmp_path / "run" / "report" / "index.html").exists()
+    assert (tmp_path / "run-replay" / "result.json").exists()
+
+
+def test_the_instruments_of_a_bench_are_checked(tmp_path: Path) -> None:
+    assert "gel: " in run("instruments_of_a_bench.py", str(tmp_path / "gel.png"))
+    assert (tmp_path / "gel.png").stat().st_size > 1000
+
+
+def test_an_objectfile_is_built_and_holds(tmp_path: Path) -> None:
+    assert "checks hold" in run("objectfile_of_a_mesh.py", str(tmp_path / "wrench"))
+
+
+def test_a_gel_is_calibrated_by_pictures(tmp_path: Path) -> None:
+    drawn, _ = drawn_set(18)
+    for index, image in enumerate(drawn.images):
+        write_png(tmp_path / f"{index:02d}.png", image)
+    write_png(tmp_path / "empty.png", drawn.background)
+    assert "dB" in run("calibration_of_a_gel.py", str(tmp_path))
+    assert tmp_path.with_name(f"{tmp_path.name}_calibration.npz").exists()
+
+
+def test_every_function_is_shown_in_an_example() -> None:
+    text = "".join(path.read_text() for path in (*SCRIPTS, ROOT / "examples" / "tour.ipynb"))
+    assert [name for name in FUNCTIONS if f"touchstone.{name}(" not in text] == []
+
+
+class Called(TouchstoneError):
+    """The function of the API was called."""
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_a_command_calls_the_function_of_its_name(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The command parses and prints; the work is the function's."""
+
+    def called(*_: object, **__: object) -> None:
+        raise Called(f"{name} was called")
+
+    monkeypatch.chdir(tmp_path)
+    write_png(tmp_path / "a.png", np.zeros((120, 160, 3), np.uint8))
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "run.json").write_text("{}")
+    monkeypatch.setattr(HOMES.get(name, "harness.api") + f".{name}", called)
+    assert invoke(COMMANDS[name].split()) == 1
+    assert f"{name} was called" in capsys.readouterr().err
+
+
+def test_each_function_has_a_command() -> None:
+    assert set(FUNCTIONS) - set(COMMANDS) == {"answer", "tactile_image"}
+
+
+def test_the_other_two_are_shorter_forms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = in_process_run(tmp_path / "run", touch_scene(contacts=2), seed=3).folder
+    replayed = touchstone.replay(folder).result
+    answered = answer(folder)
+    assert {key: replayed[key] for key in ("estimates", "accuracy")} == {
+        key: answered[key] for key in ("estimates", "accuracy")
+    }
+
+    def called(*_: object, **__: object) -> None:
+        raise Called
+
+    monkeypatch.setattr("harness.tasks.touch.render_touch", called)
+    with pytest.raises(Called):
+        tactile_image("builtin:mug", (-0.04, 0.0, 0.05))
 
 
 def test_the_notebook_runs() -> None:

@@ -20,10 +20,11 @@ from experiments.contact_localization.settings import (
 from experiments.scale_estimation.experiment import EXPERIMENT as SCALE
 from experiments.shape_reconstruction.experiment import EXPERIMENT as SHAPE
 from harness.basics.errors import WrongUse
+from harness.basics.quantities import LENGTH, TIME
 from harness.bench.scene import scene_from_json, scene_from_options
 from harness.bench.station_file import Station, load_station, station_path
 from harness.cli import invoke
-from harness.commands.run.planned_run import target_of_options
+from harness.commands.options import positive
 from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import curve_path, load, save
 from harness.cost.provenance import code, machine
@@ -291,8 +292,8 @@ def test_what_cannot_be_asked_is_refused_before_a_folder_is_made(
 
 @pytest.mark.parametrize("text", ["2s", "2 s", "2000ms", "2000 ms"])
 def test_a_budget_may_be_written_with_or_without_a_space(text: str) -> None:
-    assert target_of_options(text, None, []) == Target(seconds=2.0)
-    assert target_of_options(None, "5mm", []) == Target(error=5e-3)
+    assert positive("--budget", text, TIME) == 2.0
+    assert positive("--error", "5mm", LENGTH) == 5e-3
 
 
 @pytest.mark.slow  # resuming and budgets are tested each by themselves

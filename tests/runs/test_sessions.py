@@ -79,7 +79,7 @@ def test_a_complete_run_is_resumed_without_a_bench(
         return {"schema": 1, "warnings": [], "recording": str(run.recording.folder)}
 
     monkeypatch.setattr("harness.experiment.perform.open_station", open_nothing)
-    monkeypatch.setattr("harness.commands.run.planned_run.finish", finish)
+    monkeypatch.setattr("harness.tasks.runs.finish", finish)
     folder = copied(done, tmp_path / "run").folder
     assert invoke(["run", "--resume", str(folder), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["recording"] == str(folder)
@@ -149,7 +149,7 @@ def test_what_no_command_foresaw_is_one_sentence_too(
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("harness.commands.run.planned_run.begin", fail)
+    monkeypatch.setattr("harness.tasks.runs.begin", fail)
     code = invoke(["run", "--object", "builtin:mug", "--json"])
     captured = capsys.readouterr()
     answer = json.loads(captured.out)
@@ -167,7 +167,7 @@ def test_ctrl_c_of_a_command_that_does_not_resume_does_not_send_to_resume(
     def fail(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("harness.experiment.answer.finish", fail)
+    monkeypatch.setattr("harness.tasks.runs.finish", fail)
     assert invoke(["replay", str(done.folder), "--out", str(tmp_path / "replay")]) == 130
     assert capsys.readouterr().err == "error: interrupted\n"
 
@@ -178,7 +178,7 @@ def test_a_run_that_its_bench_ends_says_how_it_goes_on(
     def fail(*_: object, **__: object) -> None:
         raise BenchFault("the arm is gone")
 
-    monkeypatch.setattr("harness.commands.run.planned_run.perform_on_bench", fail)
+    monkeypatch.setattr("harness.tasks.runs.perform_on_bench", fail)
     folder = copied(done, tmp_path / "run").folder
     (folder / "steps" / "002.mcap").unlink()
     assert invoke(["run", "--resume", str(folder)]) == 1

@@ -104,7 +104,7 @@ def build_audio(
         failed = [check for check in verify(made) if not check.passed]
         if failed:
             raise DataRefused(
-                f"{made.folder}: {failed[0].name}: {failed[0].said}; delete the folder and build again"
+                f"{made.folder}: {failed[0].check}: {failed[0].said}; delete the folder and build again"
             )
     ordered = {before + stage: seconds[before + stage] for before in ("", CPU) for stage in STAGES}
     entry = made.description.audio

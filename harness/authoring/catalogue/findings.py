@@ -1,6 +1,6 @@
 """What intake finds of one object: units, its label against its size, openings, thin walls, implied mass."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, MeshRefused, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
+from harness.basics.result import JSON_ONLY
 from harness.objects.builtin import BUILTIN
 from harness.sim.solid.intake import surface_of, take_in
 from harness.sim.solid.mesh_read import METRES, read_mesh
@@ -38,17 +39,18 @@ class IntakeFinding:
 
     name: str  #: of the object.
     material: str  #: of it.
-    mesh: str  #: its file or ``builtin:`` name.
-    reason: str | None = None  #: why it is excluded; None where it can be built.
-    remarks: tuple[str, ...] = ()  #: what to look at, a sentence each.
+    mesh: str = field(metadata=JSON_ONLY)  #: its file or ``builtin:`` name.
+    verdict: str = "ready"  #: ``"ready"``, ``"look"`` if there are remarks, or ``"excluded"``.
+    reason: str | None = field(default=None, metadata=JSON_ONLY)  #: of the exclusion.
+    remarks: tuple[str, ...] = field(default=(), metadata=JSON_ONLY)  #: what to look at, a sentence each.
     units: str | None = None  #: that the file's numbers were taken in.
-    longest_side: float | None = None  #: m.
-    label: float | None = None  #: m, the catalogue's; None where it has none.
+    longest_side_m: float | None = None
+    label_m: float | None = None  #: the catalogue's; None where it has none.
     watertight: bool | None = None  #: whether the file's surface is closed.
-    faces: int | None = None  #: of the surface.
-    wall: float | None = None  #: m, that all but 2 % of the surface exceeds; None where the surface is open.
-    mass: float | None = None
-    """kg, implied by volume and density; None where neither volume nor wall is known."""
+    faces: int | None = field(default=None, metadata=JSON_ONLY)  #: of the surface.
+    wall_m: float | None = None  #: that all but 2 % of the surface exceeds; None where the surface is open.
+    mass_kg: float | None = None
+    """implied by volume and density; None where neither volume nor wall is known."""
 
 
 def units_of(row: CatalogueRow, mesh: str) -> str | None:
@@ -82,14 +84,21 @@ def intake_finding(row: CatalogueRow, mesh: str, sound: bool = True) -> IntakeFi
         mesh: its file, or ``builtin:`` and a name.
         sound: whether it is to have a sound, which needs a closed surface.
     """
-    found = IntakeFinding(row.name, row.material, mesh, label=row.scale)
+    found = _take_in(row, mesh, sound)
+    verdict = "excluded" if found.reason is not None else "look" if found.remarks else "ready"
+    return replace(found, verdict=verdict)
+
+
+def _take_in(row: CatalogueRow, mesh: str, sound: bool) -> IntakeFinding:
+    found = IntakeFinding(row.name, row.material, mesh, label_m=row.scale)
     try:
         surface, units, watertight, warnings = _taken(row, mesh)
         sides = surface.bounds[1] - surface.bounds[0]
+        longest = float(sides.max())
         found = replace(
             found,
             units=units,
-            longest_side=float(sides.max()),
+            longest_side_m=longest,
             watertight=watertight,
             faces=len(surface.faces),
             remarks=(*_of_label(row, sides), *warnings),
@@ -99,17 +108,16 @@ def intake_finding(row: CatalogueRow, mesh: str, sound: bool = True) -> IntakeFi
         # Touch and look do without an inside.
         open_only = isinstance(refused, MeshRefused) and found.units is not None and not sound
         return found if open_only else replace(found, reason=str(refused))
-    assert found.longest_side is not None
     wall = thin_wall(surface)
     mass = enclosed_volume(surface) * MATERIALS[row.material].density
     thin = []
-    if wall < THIN * found.longest_side:
+    if wall < THIN * longest:
         thin.append(
-            f"a wall of {wall * 1e3:.3g} mm is 1/{found.longest_side / wall:.0f} of the longest side, "
+            f"a wall of {wall * 1e3:.3g} mm is 1/{longest / wall:.0f} of the longest side, "
             f"thinner than 1/{1.0 / THIN:.0f}: filling may take hours"
         )
-    remarks = (*found.remarks, *thin, *_of_mass(row, mass, found.longest_side))
-    return replace(found, wall=wall, mass=mass, remarks=remarks)
+    remarks = (*found.remarks, *thin, *_of_mass(row, mass, longest))
+    return replace(found, wall_m=wall, mass_kg=mass, remarks=remarks)
 
 
 def _taken(row: CatalogueRow, mesh: str) -> tuple[Mesh, str, bool, tuple[str, ...]]:

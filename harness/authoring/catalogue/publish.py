@@ -19,8 +19,8 @@ class SentObject:
     """What became of one object."""
 
     name: str  #: of the object.
-    sent: int  #: bytes; 0 where all of it was there, or where it is not built.
     outcome: str  #: ``"sent"``, ``"there"`` or ``"not built"``.
+    bytes: int  #: sent; 0 where all of it was there, or where it is not built.
 
 
 class ObjectStore:
@@ -104,8 +104,8 @@ def publish(
         on(name, index / len(names))
         record = read_record(of, name)
         if record is None or not stands(of, record, record.key):
-            found.append(SentObject(name, 0, "not built"))
+            found.append(SentObject(name, "not built", 0))
             continue
         sent = store.put(of.object(name), record)
-        found.append(SentObject(name, sent, "sent" if sent else "there"))
+        found.append(SentObject(name, "sent" if sent else "there", sent))
     return found

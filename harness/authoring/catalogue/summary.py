@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from harness.authoring.catalogue.layout import BuildFolder, ObjectRecord, read_record, read_settings, stands
 from harness.basics.errors import TouchstoneError
+from harness.basics.result import HIDDEN, JSON_ONLY
 from harness.objectfile.description import Description
 from harness.objectfile.file import ObjectFile
 
@@ -24,10 +25,13 @@ class ObjectSummary:
 
     name: str  #: of the object.
     outcome: str  #: ``"built"``, ``"waiting"``, or why not.
-    reason: str  #: where it is not built.
-    record: ObjectRecord | None  #: of the last attempt; None where there was none.
-    object: ObjectFile | None
+    reason: str = field(metadata=JSON_ONLY)  #: where it is not built.
+    record: ObjectRecord | None = field(metadata=HIDDEN)  #: of the last attempt; None where there was none.
+    object: ObjectFile | None = field(metadata=HIDDEN)
     """an ObjectFile that stands, of this key or of an earlier one; None where there is none."""
+    attempts: int
+    seconds: float | None  #: of the last attempt; None where there was none.
+    modes: int | None  #: None where there is no sound.
     quality: Mapping[str, float] = field(default_factory=dict)
     """by the keys of ``QUALITY``, those that there are, in the units of their headings."""
 
@@ -42,17 +46,27 @@ def summaries(of: BuildFolder) -> list[ObjectSummary]:
 
 
 def _summary(of: BuildFolder, name: str) -> ObjectSummary:
-    record = read_record(of, name)
-    there: ObjectFile | None = None
+    record, there = read_record(of, name), None
     with suppress(TouchstoneError):
         there = ObjectFile.open(of.object(name))
-    if record is None:
-        return ObjectSummary(name, "waiting", "not built yet", None, there)
-    if record.built and not stands(of, record, record.key):
-        reason = "its files are not those that were built; build again"
-        return ObjectSummary(name, "damaged", reason, record, None)
-    quality = {} if there is None else _quality(there.description)
-    return ObjectSummary(name, record.outcome, record.reason, record, there, quality)
+    outcome, reason, quality = "waiting", "not built yet", dict[str, float]()
+    if record is not None and record.built and not stands(of, record, record.key):
+        outcome, reason, there = "damaged", "its files are not those that were built; build again", None
+    elif record is not None:
+        outcome, reason = record.outcome, record.reason
+        quality = {} if there is None else _quality(there.description)
+    audio = None if there is None else there.description.audio
+    return ObjectSummary(
+        name=name,
+        outcome=outcome,
+        reason=reason,
+        record=record,
+        object=there,
+        attempts=0 if record is None else record.attempts,
+        seconds=None if record is None else record.seconds,
+        modes=None if audio is None else len(audio.frequencies_hz),
+        quality=quality,
+    )
 
 
 def _quality(description: Description) -> dict[str, float]:

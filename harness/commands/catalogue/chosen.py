@@ -1,12 +1,9 @@
-"""What every command on a catalogue takes: the file, the folder of meshes, materials; read alike by all."""
+"""Options that commands on a catalogue share."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-
-if TYPE_CHECKING:
-    from harness.authoring.catalogue.rows import Catalogue, CatalogueRow, ExcludedRow
 
 CatalogueFileArgument = Annotated[
     Path,
@@ -33,18 +30,3 @@ Stages = Annotated[
 Senses = Annotated[
     str, typer.Option(help="Some of audio, touch and vision, with commas between them.", metavar="S,S")
 ]
-
-
-def read(
-    catalogue: Path, meshes: Path | None, materials: list[str] | None
-) -> "tuple[Catalogue, list[tuple[CatalogueRow, str]], tuple[ExcludedRow, ...]]":
-    """The catalogue of the chosen materials, its rows with their meshes, and those that cannot be built.
-
-    Raises:
-        WrongUse: no such catalogue, or a material that is none.
-    """
-    from harness.authoring.catalogue.rows import of_materials, read_catalogue, with_meshes
-
-    chosen = of_materials(read_catalogue(catalogue), materials or [])
-    rows, without = with_meshes(chosen.rows, meshes or catalogue.parent)
-    return chosen, rows, (*chosen.excluded, *without)

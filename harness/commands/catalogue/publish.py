@@ -1,13 +1,12 @@
 """``touchstone catalogue publish``: what a build made is copied to a folder or an object store."""
 
-from collections import Counter
 from typing import Annotated
 
 import typer
 
 from harness.commands import options
 from harness.commands.catalogue.status import BuiltFolder
-from harness.commands.output import ANSWERS, emit, share_progress
+from harness.commands.output import print_result, share_progress
 
 
 def publish(
@@ -29,18 +28,9 @@ def publish(
 
     Try: touchstone catalogue publish built s3://bucket/objects
     """
-    from harness.authoring.catalogue.layout import BuildFolder
-    from harness.authoring.catalogue.publish import ObjectStore, publish
+    from harness.tasks.catalogue import publish_catalogue
 
-    store = ObjectStore(to)
     with share_progress(quiet=json) as report:
-        found = publish(BuildFolder(folder), store, report)
-    counts = Counter(each.outcome for each in found)
-    sent = sum(each.sent for each in found)
-    if json:
-        objects = [{"name": e.name, "outcome": e.outcome, "bytes": e.sent} for e in found]
-        emit({"schema": 1, "url": to, "counts": dict(counts), "bytes": sent, "objects": objects})
-    else:
-        said = ", ".join(f"{count} {outcome}" for outcome, count in counts.most_common())
-        ANSWERS.print(f"{len(found)} objects: {said}; {sent / 1e6:.3g} MB sent to {to}", markup=False)
-    return 1 if counts["not built"] else 0
+        published = publish_catalogue(folder, to, report)
+    print_result(published, json)
+    return 1 if published.counts.get("not built") else 0

@@ -20,14 +20,9 @@ def build(
             help="smoke, shipped (of the fewest bytes), standard, or, of vision, paper: networks of its size."
         ),
     ] = "standard",
-    units: Annotated[
-        str | None, typer.Option(help="Of the file's numbers: m, cm, mm, um, in or ft.", metavar="U")
-    ] = None,
+    units: options.Units = None,
     up_axis: options.UpAxis = None,
-    wall: Annotated[
-        str | None,
-        typer.Option(help="Wall of a hollow thing of which the file is the outside, as 2mm.", metavar="L"),
-    ] = None,
+    wall: options.Wall = None,
     up_to: options.UpTo = "20kHz",
     modes: options.MostModes = 128,
     edge: options.LongestEdge = None,

@@ -29,9 +29,7 @@ CODE = "harness.authoring.vision.cost"
 
 def vision(
     mesh: options.MeshArgument,
-    units: Annotated[
-        str | None, typer.Option(help="Of the file's numbers: m, cm, mm, um, in or ft.", metavar="U")
-    ] = None,
+    units: options.Units = None,
     profile: Annotated[str, typer.Option(help="Of the networks: smoke or standard.")] = "smoke",
     knob: Annotated[
         list[str] | None,

@@ -6,8 +6,7 @@ from typing import Annotated
 import typer
 
 from harness.commands import options
-from harness.commands.object.object import published_lines
-from harness.commands.output import ANSWERS, emit, warn
+from harness.commands.output import print_result
 
 Two = tuple[float, float]
 
@@ -48,30 +47,12 @@ def import_published(
     from harness.authoring.published.imported import LICENCE
     from harness.authoring.published.imported import import_published as read
     from harness.basics.files.lock_file import hold_folder
+    from harness.tasks.published import ImportedObject
 
     with hold_folder(out):
         of = read(file, out, name, LICENCE if licence is None else licence, audio_bounds, touch_bounds)
-    description = of.description
-    if not json:
-        for line in [*published_lines(description), str(of.folder)]:
-            ANSWERS.print(line, markup=False)
-        return 0
-    networks = description.networks.items()
-    emit({
-        "schema": 1,
-        "folder": str(of.folder),
-        "object": description.name,
-        "format": description.format,
-        "sha256": description.provenance.sources[0].sha256,
-        "licence": description.provenance.licence,
-        "networks": {sense: {"file": entry.file, "bytes": entry.bytes} for sense, entry in networks},
-        "missing": list(description.missing),
-        "dropped": dict(description.dropped),
-    })  # fmt: skip
+    print_result(ImportedObject.of(of), json)
     return 0
-
-
-_COMPAT_SIZE = 256
 
 
 def render_queries(
@@ -102,7 +83,7 @@ def render_queries(
         Path | None,
         typer.Option(help="Of the gel's colours: the folder calibs of ObjectFolder 2.0.", metavar="FOLDER"),
     ] = None,
-    size: Annotated[int, typer.Option(help="Pixels a side of pictures.", min=1, max=1024)] = _COMPAT_SIZE,
+    size: Annotated[int, typer.Option(help="Pixels a side of pictures.", min=1, max=1024)] = 256,
     seconds: Annotated[float, typer.Option(help="Length of sounds.", metavar="S")] = 3.0,
     rate: Annotated[float, typer.Option(help="Samples per second.", metavar="HZ")] = 44100.0,
     metres_per_unit: Annotated[
@@ -129,17 +110,11 @@ def render_queries(
     Try: touchstone object render queries objects/published_mug --vision vision_demo.npy --out rendered
     """
     options.require_folders(("--out", out))
-    from harness.basics.errors import WrongUse
+    from harness import api
     from harness.basics.quantities import LENGTH
     from harness.objectfile.published.answers import QuerySettings, answer_queries, read_queries
-    from harness.objectfile.published.entries import open_either
+    from harness.tasks.published import RenderedQueries
 
-    if not 0.0 < seconds <= 60.0:
-        raise WrongUse(f"--seconds {seconds:g}: sounds are above 0 and at most 60 s long")
-    if objectfolder_compat and (size, seconds, rate) != (_COMPAT_SIZE, 3.0, 44100.0):
-        raise WrongUse(
-            "--objectfolder-compat says size, length and rate itself; leave --size, --seconds and --rate out"
-        )
     unit = options.positive("--metres-per-unit", metres_per_unit, LENGTH)
     settings = QuerySettings(size, seconds, rate, objectfolder_compat, calibration, unit)
     files = {
@@ -149,25 +124,8 @@ def render_queries(
         "--touch-gelinfo": touch_gelinfo,
         "--vision": vision,
     }
-    of = open_either(folder)
+    of = api.load_object(folder)
     answered = answer_queries(of, read_queries(of, files, settings), settings, out)
-    for sentence in answered.notes:
-        warn(sentence)
-    if json:
-        emit({
-            "schema": 1,
-            "folder": str(of.folder),
-            "object": of.description.name,
-            "objectfolder_compat": objectfolder_compat,
-            "files": {sense: [str(path) for path in paths] for sense, paths in answered.files.items()},
-            "full_scale": answered.full_scale,
-            "notes": answered.notes,
-            "seconds": answered.seconds,
-        })  # fmt: skip
-        return 0
-    for sense, paths in answered.files.items():
-        ANSWERS.print(
-            f"{sense}: {len(paths)} files, {paths[0]} and so on; {answered.seconds[sense]:.2f} s",
-            markup=False,
-        )
+    rendered = RenderedQueries.of(of.folder, of.description.name, objectfolder_compat, answered)
+    print_result(rendered, json)
     return 0

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from harness.commands import force_options as forces
 from harness.commands import options
+from harness.commands import press_options as presses
 from harness.commands.output import print_result
 
 
@@ -65,16 +65,16 @@ def depth(
             help="The heights alone, as `sim touch --heights-of gel` takes them.", metavar="FILE.npy"
         ),
     ] = None,
-    force: forces.Force = False,
+    force: presses.Force = False,
     thickness: Annotated[
         str | None,
         typer.Option(
             help="Thickness of the gel, for --force; that of the sensor if left out.", metavar="LENGTH"
         ),
     ] = None,
-    gel_modulus: forces.Modulus = None,
-    gel_modulus_error: forces.ModulusError = None,
-    gel_poisson: forces.Poisson = None,
+    gel_modulus: presses.Modulus = None,
+    gel_modulus_error: presses.ModulusError = None,
+    gel_poisson: presses.Poisson = None,
     json: options.Json = False,
 ) -> int:
     """Read the surface of a pressed gel from what its camera saw.
@@ -90,15 +90,15 @@ def depth(
     options.require_files(
         ("--out", out, ".npz"), ("--picture", picture, ".png"), ("--height-out", height_out, ".npy")
     )
-    own = {"--thickness": thickness, "--gel-poisson": gel_poisson}
-    forces.require_force(force, [], gel_modulus, gel_modulus_error, **own)
     measured = api.depth(
         images,
         calibration=calibration,
         background=background,
         sensor=sensor,
         station=station,
-        gel=forces.stiffness(gel_modulus, gel_modulus_error, gel_poisson) if force else None,
+        gel=presses.read_stiffness(
+            force, (), gel_modulus, gel_modulus_error, gel_poisson, thickness=thickness
+        ),
         thickness=options.positive("--thickness", thickness, LENGTH),
         out=out,
         height_out=height_out,

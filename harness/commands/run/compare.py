@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from harness.commands import options
+from harness.commands.output import print_result
 
 
 def compare(
@@ -34,28 +35,7 @@ def compare(
 
     To try: touchstone compare runs/... --objectfile objects/bowl
     """
-    from harness.agreement.compare_run import agreement_of
-    from harness.agreement.subject import own_subject, subject_of_file
-    from harness.commands.output import ANSWERS, emit
-    from harness.experiment.answer import levels_of_result
-    from harness.experiment.lookup import experiment_of
-    from harness.recording.recording import Recording
-    from harness.recording.run_folder import RunFiles
+    from harness import api
 
-    files = RunFiles(Recording(run))
-    kind = experiment_of(files.recording)
-    if objectfile is None:
-        subject = own_subject(files, levels_of_result(kind, run))
-        found = agreement_of(files, subject, reference, kind.measured)
-    else:
-        found = agreement_of(files, subject_of_file(files, objectfile), reference)
-    if json:
-        emit({"schema": 1, "recording": str(run), **found.as_json()})
-        return 0
-    ANSWERS.print(f"{run} against {found.about}", markup=False)
-    for line in found.lines():
-        ANSWERS.print(f"  {line}", markup=False)
-    doubt = found.first_doubt
-    if doubt is not None:
-        ANSWERS.print(f"first in doubt: {doubt[1]} at step {doubt[0] + 1}", markup=False)
+    print_result(api.compare(run, objectfile, reference), json)
     return 0

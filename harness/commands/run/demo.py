@@ -5,12 +5,13 @@ from typing import Annotated, Any
 
 import typer
 
+from harness.bench.experiments import DEFAULT_EXPERIMENT
 from harness.commands import options
 from harness.commands.output import CONSOLE
-from harness.commands.run.run import DEFAULT, RUNNABLE, Spacing, run
+from harness.commands.run.run import RUNNABLE, Spacing, run
 
 _OPTIONS: dict[str, dict[str, Any]] = {
-    DEFAULT: {"contacts": 4, "spacing": Spacing.SPREAD, "sense": "both"},
+    DEFAULT_EXPERIMENT: {"contacts": 4, "spacing": Spacing.SPREAD, "sense": "both"},
     "scale-estimation": {"contacts": 5},
     "shape-reconstruction": {"presses": 4, "set_": ["choose=active"]},
 }
@@ -23,7 +24,7 @@ def demo(
         typer.Argument(
             help=f"What to run: {', '.join(RUNNABLE)}.", metavar="NAME", callback=options.check_experiment
         ),
-    ] = DEFAULT,
+    ] = DEFAULT_EXPERIMENT,
     object_: Annotated[
         str, typer.Option("--object", help="An object of ours: mug, bowl, plate, pitcher, tray, wrench.")
     ] = "mug",

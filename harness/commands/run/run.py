@@ -2,17 +2,15 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from harness.bench.experiments import experiment_names
+from harness.bench.experiments import DEFAULT_EXPERIMENT, experiment_names
 from harness.commands import options
+from harness.commands.output import print_result, stopped
 
 RUNNABLE = experiment_names()
-
-DEFAULT = "contact-localization"
-"""Run where no experiment is named."""
 
 
 class Spacing(StrEnum):
@@ -33,7 +31,7 @@ def run(
     experiment: Annotated[
         str | None,
         typer.Argument(
-            help=f"What to run: {', '.join(RUNNABLE)}; {DEFAULT} if left out.",
+            help=f"What to run: {', '.join(RUNNABLE)}; {DEFAULT_EXPERIMENT} if left out.",
             metavar="NAME",
             callback=options.check_experiment,
         ),
@@ -102,29 +100,33 @@ def run(
     Try: touchstone run contact-localization --station mock --scene scenes/mug_touch.toml
     """
     options.require_folders(("--out", out))
-    from harness.commands.run.planned_run import (
-        BenchOptions,
-        new_run,
-        perform_and_answer,
-        resumed_run,
-        target_of_options,
-    )
-    from harness.commands.scenes import SceneOptions
-    from harness.experiment.lookup import named
+    from harness import api
+    from harness.basics.quantities import LENGTH, TIME
+    from harness.commands.run.watcher import TerminalWatcher
+    from harness.tasks.runs import RunStopped
+    from harness.tasks.scenes import SceneOptions
 
-    keys: dict[str, Any] = {"contacts": contacts, "presses": presses, "spacing": spacing, "yaw": yaw}
+    keys = {"contacts": contacts, "presses": presses, "spacing": spacing, "yaw": yaw}
     wanted = SceneOptions(
         *(scene, object_, material, units, wall, objectfile, sense, range_, keys, tuple(set_ or ())),
         up_axis=up_axis,
     )
-    on = BenchOptions(station, seed, gap, bench, out)
-    levels = level or []
-    if resume is not None:
-        target = target_of_options(budget, error, levels)
-        planned = resumed_run(resume, experiment, wanted, on, levels, target)
-    else:
-        kind = named(experiment or DEFAULT)
-        if error is not None and kind.error_key is not None:  # the run itself ends when that is met
-            keys[kind.error_key], error = error, None
-        planned = new_run(kind, wanted, on, levels, target_of_options(budget, error, levels))
-    return perform_and_answer(planned, json)
+    try:
+        made = api.run(
+            experiment,
+            wanted,
+            station,
+            levels=level or (),
+            budget=options.positive("--budget", budget, TIME),
+            error=options.positive("--error", error, LENGTH),
+            seed=seed,
+            gap=gap,
+            bench=bench,
+            out=out,
+            resume=resume,
+            watcher=TerminalWatcher(json),
+        )
+    except RunStopped as stop:
+        return stopped(stop, stop.folder, json)
+    print_result(made, json)
+    return 0

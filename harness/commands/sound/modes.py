@@ -26,9 +26,7 @@ def modes(
     material: Annotated[
         str | None, typer.Option(help="What it is made of; a built-in object's own if left out.", metavar="M")
     ] = None,
-    units: Annotated[
-        str | None, typer.Option(help="Of the file's numbers: m, cm, mm, um, in or ft.", metavar="U")
-    ] = None,
+    units: options.Units = None,
     up_axis: options.UpAxis = None,
     young: Annotated[str | None, typer.Option(help="Young's modulus, as 210GPa.", metavar="E")] = None,
     poisson: Annotated[float | None, typer.Option(help="Poisson's ratio.", metavar="NU")] = None,
@@ -39,12 +37,7 @@ def modes(
     beta: Annotated[
         str | None, typer.Option(help="Damping proportional to stiffness, in s.", metavar="B")
     ] = None,
-    wall: Annotated[
-        str | None,
-        typer.Option(
-            help="Wall of a hollow thing of which the file is the outside, as 2mm.", metavar="LENGTH"
-        ),
-    ] = None,
+    wall: options.Wall = None,
     count: Annotated[
         int | None, typer.Option("--modes", help="So many, the lowest.", metavar="N", min=1)
     ] = None,
@@ -52,10 +45,7 @@ def modes(
         str | None,
         typer.Option("--up-to", help="All up to this frequency; 20kHz if no number is given.", metavar="F"),
     ] = None,
-    edge: Annotated[
-        str | None,
-        typer.Option(help="Longest edge of an element, as 3mm; chosen by the wave if left out.", metavar="L"),
-    ] = None,
+    edge: options.LongestEdge = None,
     envelope: Annotated[
         str | None,
         typer.Option(

@@ -76,6 +76,10 @@ _REASONS = {
 """Reasons why an option is needed with others, or cannot be given."""
 
 
+COMPAT_SIZE = 256
+"""Pixels a side of the pictures of the published programs."""
+
+
 @dataclass(frozen=True)
 class QuerySettings:
     """Settings of the answers."""
@@ -86,6 +90,15 @@ class QuerySettings:
     compat: bool  #: whether everything is as the published programs do it.
     calibration: Path | None  #: folder of the gel's colours; None for maps alone.
     metres_per_unit: float | None  #: unit of the vision frame, for an object built from its mesh.
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.seconds <= 60.0:
+            raise WrongUse(f"--seconds {self.seconds:g}: sounds are above 0 and at most 60 s long")
+        if self.compat and (self.size, self.seconds, self.rate) != (COMPAT_SIZE, 3.0, 44100.0):
+            raise WrongUse(
+                "--objectfolder-compat says size, length and rate itself; leave --size, --seconds and --rate "
+                "out"
+            )
 
 
 @dataclass(eq=False)

@@ -28,17 +28,20 @@ class TouchPictures:
     words: tuple[str, ...]
     """under the height map, the picture, its change, the live picture, live against simulated, live against
     the background."""
+    name: str = "simulated"  #: source of heights and picture.
+    reference: tuple[FloatArray, ByteArray] | None = None  #: heights and picture by the rasteriser.
+    caption: str = ""  #: under all.
 
 
 def touch_figure(shown: TouchPictures) -> Figure:
-    """A row of the simulated press, and a row of the live one under it where there is one.
+    """Draw a row of the press, and under it a row of the live picture or of the rasteriser's press.
 
     Raises:
         ValueError: pictures of other shapes, or heights that are not finite.
     """
     _check(shown)
     rows, columns = shown.heights.shape
-    down = 1 if shown.live is None else 2
+    down = 1 if shown.live is None and shown.reference is None else 2
     with styled():
         figure = blank(3 * _WIDTH + 0.9, down * (_WIDTH * rows / columns + _TITLES), "constrained")
         grid = np.asarray(figure.subplots(down, 3, squeeze=False))
@@ -47,55 +50,22 @@ def touch_figure(shown: TouchPictures) -> Figure:
         _map(figure, axes, 1e3 * shown.heights, shown.pitch, (1e3 * low, 1e3 * high), "mm")
         axes.set_title("indentation", fontsize=10)
         axes.set_xlabel(f"gel x in mm\n{shown.words[0]}", fontsize=8)
-        titled_picture(grid[0, 1], shown.image, "simulated", shown.words[1])
-        _difference(grid[0, 2], shown.image, shown.background, "simulated - background", shown.words[2])
+        titled_picture(grid[0, 1], shown.image, shown.name, shown.words[1])
+        _difference(grid[0, 2], shown.image, shown.background, f"{shown.name} - background", shown.words[2])
         if shown.live is not None:
             titled_picture(grid[1, 0], shown.live, "live", shown.words[3])
             _difference(grid[1, 1], shown.live, shown.image, "live - simulated", shown.words[4])
             _difference(grid[1, 2], shown.live, shown.background, "live - background", shown.words[5])
-    return figure
-
-
-@dataclass(frozen=True, eq=False)
-class LevelPictures:
-    """A press by one level of an object's touch, beside the rasteriser's."""
-
-    level: str  #: its name.
-    heights: FloatArray  #: ``(rows, columns)`` metres of indentation of the gel.
-    image: ByteArray  #: ``(rows, columns, 3)`` RGB.
-    background: ByteArray  #: the same of the untouched gel.
-    reference: tuple[FloatArray, ByteArray] | None
-    """heights and picture by the rasteriser; None where that is the level."""
-    pitch: float  #: metres a pixel.
-    words: tuple[str, str]  #: under the height map, and under the differences.
-
-
-def levels_figure(shown: LevelPictures) -> Figure:
-    """A row of the level's press, and under it how far it is from the rasteriser's.
-
-    Raises:
-        ValueError: pictures of other shapes, or heights that are not finite.
-    """
-    _check(TouchPictures(shown.heights, shown.image, shown.background, None, shown.pitch, ("", "", "")))
-    rows, columns = shown.heights.shape
-    down = 1 if shown.reference is None else 2
-    with styled():
-        figure = blank(3 * _WIDTH + 0.9, down * (_WIDTH * rows / columns + _TITLES), "constrained")
-        grid = np.asarray(figure.subplots(down, 3, squeeze=False))
-        low, high = min(0.0, float(shown.heights.min())), max(1e-6, float(shown.heights.max()))
-        _map(figure, grid[0, 0], 1e3 * shown.heights, shown.pitch, (1e3 * low, 1e3 * high), "mm")
-        grid[0, 0].set_title(f"indentation, {shown.level}", fontsize=10)
-        titled_picture(grid[0, 1], shown.image, shown.level, "")
-        _difference(grid[0, 2], shown.image, shown.background, f"{shown.level} - background", "")
-        if shown.reference is not None:
+        elif shown.reference is not None:
             heights, image = shown.reference
-            apart = 1e6 * (shown.heights - heights)
-            most = max(1e-3, float(np.abs(apart).max()))
-            _map(figure, grid[1, 0], apart, shown.pitch, (-most, most), "um", "RdBu_r")
-            grid[1, 0].set_title(f"indentation, {shown.level} - rasteriser", fontsize=10)
+            gap = 1e6 * (shown.heights - heights)
+            largest = max(1e-3, float(np.abs(gap).max()))
+            _map(figure, grid[1, 0], gap, shown.pitch, (-largest, largest), "um", "RdBu_r")
+            grid[1, 0].set_title(f"indentation, {shown.name} - rasteriser", fontsize=10)
             titled_picture(grid[1, 1], image, "rasteriser", "")
-            _difference(grid[1, 2], shown.image, image, f"{shown.level} - rasteriser", "")
-        figure.supxlabel("\n".join(shown.words[:down]), fontsize=8)
+            _difference(grid[1, 2], shown.image, image, f"{shown.name} - rasteriser", "")
+        if shown.caption:
+            figure.supxlabel(shown.caption, fontsize=8)
     return figure
 
 

@@ -22,9 +22,9 @@ from experiments.shape_reconstruction.cells import PRESSES, ShapeCell
 from experiments.shape_reconstruction.experiment import EXPERIMENT, NAME
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.bench.scene import scene_from_options
-from harness.commands.scenes import with_assignments
 from harness.experiment.measuring import table_of
 from harness.objects.builtin import build
+from harness.tasks.scenes import with_assignments
 from tests.experiments.shape_reconstruction.touched import evidence_of, look_at, presses
 
 MUG = build("mug", 6e-3)

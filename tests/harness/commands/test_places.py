@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import OutOfDomain, WrongUse
-from harness.commands.places import point, pressed_place
+from harness.commands.places import point
 from harness.objects.builtin import build
+from harness.tasks.touch import find_place
 
 MUG = build("mug")
 
@@ -25,7 +26,7 @@ def test_what_is_no_coordinate_is_refused_by_its_option(text: str) -> None:
 
 
 def test_a_vertex_is_a_place_of_the_surface() -> None:
-    place = pressed_place(MUG, None, 7)
+    place = find_place(MUG, None, 7)
     assert place.point == pytest.approx(MUG.vertices[7])
     assert np.linalg.norm(place.normal) == pytest.approx(1.0)
 
@@ -33,11 +34,11 @@ def test_a_vertex_is_a_place_of_the_surface() -> None:
 @pytest.mark.parametrize("vertex", [-1, len(MUG.vertices)])
 def test_a_vertex_that_there_is_not_is_named(vertex: int) -> None:
     with pytest.raises(OutOfDomain, match=f"{vertex}.* {len(MUG.vertices)}"):
-        pressed_place(MUG, None, vertex)
+        find_place(MUG, None, vertex)
 
 
 def test_one_of_the_two_is_wanted() -> None:
     with pytest.raises(WrongUse, match=r"--contact X Y Z.*--vertex N"):
-        pressed_place(MUG, None, None)
+        find_place(MUG, None, None)
     with pytest.raises(WrongUse, match=r"--contact X Y Z.*--vertex N"):
-        pressed_place(MUG, ("0", "0", "0"), 1)
+        find_place(MUG, (0.0, 0.0, 0.0), 1)

@@ -8,12 +8,12 @@ import pytest
 
 from harness.basics.errors import WrongUse
 from harness.bench.scene import scene_from_options
-from harness.commands.scenes import with_assignments
 from harness.experiment.in_process import RunCell
 from harness.experiment.lookup import named
 from harness.experiment.measuring import MeasuredColumn, Measurement
 from harness.experiment.subjects import REAL, objects
 from harness.experiment.tables import by_object, require_same_keys, rows
+from harness.tasks.scenes import with_assignments
 
 
 def test_a_folder_goes_on_with_the_keys_it_began_with(tmp_path: Path) -> None:

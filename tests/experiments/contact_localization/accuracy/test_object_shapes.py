@@ -21,7 +21,6 @@ from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile, Sensors, scene_from_options
 from harness.bench.station_file import load_station, station_path
-from harness.commands.scenes import SceneOptions, resolve
 from harness.cost.curve import Point, Sample
 from harness.effects.accuracy import Accuracy, Level
 from harness.effects.scene_object import known_object
@@ -34,6 +33,7 @@ from harness.objectfile.entries import Modality, Provenance
 from harness.objectfile.file import ObjectFile, create_object
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles, create_run, station_calibration
+from harness.tasks.scenes import SceneOptions, resolve
 from tests.samples.object_bench import MODES, egg_part
 
 STATION = load_station(station_path("mock"))

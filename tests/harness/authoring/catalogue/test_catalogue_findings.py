@@ -25,8 +25,8 @@ def test_a_label_decides_the_unit_of_a_mesh_that_does_not_state_one(
     mesh = block(tmp_path, (0.3 * scale, 0.1 * scale, 0.1 * scale))
     found = intake_finding(replace(ROW, scale=0.3), mesh)
     assert (found.units, found.reason) == (unit, None)
-    assert found.longest_side == pytest.approx(0.3)
-    assert found.mass == pytest.approx(3e-3 * 7850.0, rel=0.02)
+    assert found.longest_side_m == pytest.approx(0.3)
+    assert found.mass_kg == pytest.approx(3e-3 * 7850.0, rel=0.02)
 
 
 def test_without_a_label_two_readings_exclude_and_say_what_to_do(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_an_open_surface_has_no_sound_and_may_have_a_touch(tmp_path: Path) -> No
     walled = intake_finding(replace(row, wall=2e-3), str(tmp_path / "open.stl"))
     assert walled.reason is None
     # Vertices of edges move along the diagonal between two faces, so walls are thinner beside them.
-    assert 0.8 < (walled.mass or 0.0) / (5 * 0.01 * 2e-3 * 7850.0) < 1.0
+    assert 0.8 < (walled.mass_kg or 0.0) / (5 * 0.01 * 2e-3 * 7850.0) < 1.0
 
 
 def test_a_file_that_is_no_mesh_is_excluded_with_its_reason(tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ def test_the_published_label_of_the_mug_is_its_height(shared_data: Path) -> None
     folder = shared_data / "meshes" / "objectfolder"
     mug = next(row for row in read_catalogue(folder / "objects.csv").rows if row.name == "025_mug")
     found = intake_finding(replace(mug, mass=0.118), str(folder / "demo_model.obj"))
-    assert found.longest_side == pytest.approx(0.117, rel=1e-3)
+    assert found.longest_side_m == pytest.approx(0.117, rel=1e-3)
     assert any("0.082 m " in s and "along z" in s for s in found.remarks)
     assert any("weighs 0.118 kg (9.2 times)" in remark for remark in found.remarks)
 

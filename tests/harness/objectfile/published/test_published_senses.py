@@ -207,7 +207,7 @@ def test_everything_of_an_imported_folder_is_verified_and_damage_is_found(tmp_pa
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     path.write_bytes(bytes(data))
-    assert "vision_fine.onnx: bytes" in [check.name for check in verify(of) if not check.passed]
+    assert "vision_fine.onnx: bytes" in [check.check for check in verify(of) if not check.passed]
     (of.folder / "audio.onnx").unlink()
     with pytest.raises(DataRefused, match=r"audio\.onnx"):
         mode_gains(of, of.description.audio_gains, POINT)

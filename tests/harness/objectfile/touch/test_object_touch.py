@@ -41,13 +41,13 @@ def presses(count: int = 6) -> Presses:
 
 
 def failures(of: ObjectFile) -> dict[str, str]:
-    return {check.name: check.said for check in verify(of) if not check.passed}
+    return {check.check: check.said for check in verify(of) if not check.passed}
 
 
 def test_a_touch_as_it_was_built_passes_every_check(peg_object: ObjectFile) -> None:
     checks = verify(peg_object)
     assert all(check.passed for check in checks), checks
-    assert [check.name for check in checks] == [
+    assert [check.check for check in checks] == [
         *(f"{name}: bytes" for name in ("mesh.ply", "touch.onnx", "touch_nodes.npy")),
         *("folder: nothing else", "mesh", "touch: graph", "touch: domain", "touch: self-test"),
         "touch: codes and mesh",

@@ -40,13 +40,13 @@ def spoiled(box_object: ObjectFile, tmp_path: Path) -> Path:
 
 
 def failures(of: ObjectFile) -> dict[str, str]:
-    return {check.name: check.said for check in verify(of) if not check.passed}
+    return {check.check: check.said for check in verify(of) if not check.passed}
 
 
 def test_a_look_as_it_was_built_passes_every_check(box_object: ObjectFile) -> None:
     checks = verify(ObjectFile.open(box_object.folder))
     assert all(check.passed for check in checks), checks
-    assert [check.name for check in checks] == [
+    assert [check.check for check in checks] == [
         *(f"{name}: bytes" for name in ("mesh.ply", "vision.onnx")),
         *("folder: nothing else", "mesh", "vision: graph", "vision: domain", "vision: self-test"),
         *("vision: networks", "vision: networks and surface"),

@@ -1,8 +1,8 @@
-"""From options to the scene they mean."""
+"""Descriptions of a scene: a file, or an object, with changed settings."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,9 @@ from harness.bench.scene import SceneFile, Section, load_scene, scene_from_json,
 
 @dataclass(frozen=True)
 class SceneOptions:
-    """What a command line says of a scene; None where it says nothing."""
+    """A scene: a file, or an object instead, and settings that differ; None for those left out."""
 
-    scene: Path | None = None  #: a file.
+    scene: Path | None = None  #: its file or name.
     object: str | None = None  #: a mesh, a built-in object or an ObjectFile instead.
     material: str | None = None  #: of that object.
     units: str | None = None  #: of that object.
@@ -26,6 +26,10 @@ class SceneOptions:
     keys: Mapping[str, Any] = field(default_factory=dict)  #: of the experiment's table.
     assignments: Sequence[str] = ()  #: the same, as ``KEY=VALUE``.
     up_axis: str | None = None  #: of that object.
+
+    def with_key(self, key: str, value: str) -> "SceneOptions":
+        """Return the same description with another key of the experiment's table."""
+        return replace(self, keys={**self.keys, key: value})
 
     @property
     def of_object(self) -> tuple[str | None, ...]:
