@@ -76,7 +76,7 @@ def test_a_complete_run_is_resumed_without_a_bench(
         raise AssertionError("a bench was opened for a run that is complete")
 
     def finish(_kind: object, run: RunFiles, *_: object, **__: object) -> dict[str, Any]:
-        return {"schema": 1, "warnings": [], "recording": str(run.recording.folder)}
+        return {"schema": 1, "warnings": [], "recording": str(run.recording.folder), "report": "none"}
 
     monkeypatch.setattr("harness.experiment.perform.open_station", open_nothing)
     monkeypatch.setattr("harness.tasks.runs.finish", finish)
