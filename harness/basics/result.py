@@ -82,7 +82,7 @@ def text_tables(result: Result) -> Iterator[TextTable]:
                 for path, leaf in leaves
             ]
             yield heading(name)[0], ["", *(key.replace("_", " ") for key in keys)], rows
-        elif value and _is_records(value):
+        elif _is_records(value) and value:
             printed = [item.name for item in fields(value[0]) if item.metadata.get("text", True)]
             # A column that no record fills is left out.
             keys = [key for key in printed if any(vars(each)[key] not in (None, "", ()) for each in value)]

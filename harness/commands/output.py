@@ -91,7 +91,7 @@ def stopped(stop: TouchstoneError, folder: Path, as_json: bool) -> int:
     """Print that Ctrl-C ended a session after a step, and how to resume it; return the exit code."""
     CONSOLE.print(str(stop), markup=False)
     if as_json:
-        kind = {"kind": "interrupted", "exit_code": stop.exit_code, "recording": str(folder)}
+        kind = {"kind": stop.kind(), "exit_code": stop.exit_code, "recording": str(folder)}
         emit({"schema": 1, "error": str(stop), **kind})
     return stop.exit_code
 

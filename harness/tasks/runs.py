@@ -94,6 +94,11 @@ class RunStopped(TouchstoneError):
 
     exit_code = 130
 
+    @classmethod
+    def kind(cls) -> str:
+        """Return the kind of every end by Ctrl-C."""
+        return "interrupted"
+
     def __init__(self, last_step: str, folder: Path, resume_command: str) -> None:
         self.folder = folder
         super().__init__(f"stopped after {last_step}; go on with `{resume_command}`")
