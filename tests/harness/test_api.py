@@ -29,7 +29,7 @@ COMMANDS = {
     "calibrate_taxim": "calibrate taxim . --ball-radius 2mm --pitch 0.1mm",
     "check_station": "check",
     "compare": "compare run",
-    "compare_vision": "object compare vision mug --live a.png --camera 0.2 0 0",
+    "compare_vision": "object compare vision mug --live a.png --camera 0.2 0 0 --out b.png",
     "depth": "depth a.png --calibration gelsight_r15_bench",
     "load_object": "object info mug",
     "modes": "sim modes builtin:bowl --material ceramic",
@@ -96,7 +96,7 @@ def test_an_object_is_drawn_by_its_networks(tmp_path: Path) -> None:
 def test_a_run_is_made_replayed_and_compared(tmp_path: Path) -> None:
     said = run("run_on_a_bench.py", str(tmp_path / "run"))
     assert "touch against the " in said
-    assert (tmp_path / "run" / "report" / "index.html").exists()
+    assert Path(said.partition(": ")[0]).stat().st_size > 1000
     assert (tmp_path / "run-replay" / "result.json").exists()
 
 
@@ -114,7 +114,7 @@ def test_a_gel_is_calibrated_by_pictures(tmp_path: Path) -> None:
     for index, image in enumerate(drawn.images):
         write_png(tmp_path / f"{index:02d}.png", image)
     write_png(tmp_path / "empty.png", drawn.background)
-    assert "dB" in run("calibration_of_a_gel.py", str(tmp_path))
+    assert "18 presses" in run("calibration_of_a_gel.py", str(tmp_path))
     assert tmp_path.with_name(f"{tmp_path.name}_calibration.npz").exists()
 
 
@@ -153,9 +153,9 @@ def test_the_other_two_are_shorter_forms(tmp_path: Path, monkeypatch: pytest.Mon
     folder = in_process_run(tmp_path / "run", touch_scene(contacts=2), seed=3).folder
     replayed = touchstone.replay(folder).result
     answered = answer(folder)
-    assert {key: replayed[key] for key in ("estimates", "accuracy")} == {
-        key: answered[key] for key in ("estimates", "accuracy")
-    }
+    assert replayed["accuracy"] == answered["accuracy"]
+    places = [each["estimates"]["touch"]["position_m"] for each in (replayed, answered)]
+    assert places[0] == places[1]
 
     def called(*_: object, **__: object) -> None:
         raise Called
