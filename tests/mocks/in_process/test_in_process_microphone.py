@@ -23,7 +23,8 @@ from harness.recording.run_folder import RunFiles, create_run, station_acquisiti
 from harness.recording.step_file import Step
 from harness.skills.planning import RunPlan
 from harness.strikes.peaks import analyse
-from mocks.in_process.bench import DRIFT_PPM, LATENCY, WANDER, in_process_bench
+from mocks.in_process.bench import in_process_bench
+from mocks.in_process.microphone import DRIFT_PPM, LATENCY, WANDER
 from tests.support.heard_strikes import Readings, delay, performed, strikes_on
 
 SEED, RATE = 5, 48e3
