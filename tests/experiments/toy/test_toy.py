@@ -75,7 +75,7 @@ def test_it_has_a_table_and_a_cost_curve(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The row of the toy is in this process alone.
-    monkeypatch.setattr("harness.commands.run.cost.own_cores", lambda: 1)
+    monkeypatch.setattr("harness.tasks.measuring.own_cores", lambda: 1)
     one = ["--only", "mug", "--seeds", "1", "--gap", "none"]
     table = said(capsys, "tables", "toy", *one, "--workers", "1", "--out", str(tmp_path / "table"))
     assert [row["method"] for row in table["rows"]] == ["default", "toy.stride = 8"]
