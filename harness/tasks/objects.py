@@ -79,10 +79,9 @@ def describe_object(of: Description | PublishedDescription) -> list[str]:
         errors = "".join(f"; {name} {number:.4g}" for name, number in (measured or {}).items())
         lines.append(f"    {label:<7} {file}, {size / 1e6:.2f} MB{errors}")
 
-    lines += [
-        f"  {name:<9} none yet" for name, sense in (("audio", audio), ("touch", touch)) if sense is None
-    ]
-    if audio is not None:
+    if audio is None:
+        lines.append("  audio     none yet")
+    else:
         low, high = audio.frequencies_hz[0], audio.frequencies_hz[-1]
         lines.append(
             f"  audio     {len(audio.frequencies_hz)} modes, {low:.5g} to {high:.5g} Hz, all up to "
