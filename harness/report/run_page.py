@@ -61,8 +61,9 @@ def write_run_page(
     """
     folder.mkdir(parents=True, exist_ok=True)
     run, header = scored.run, scored.run.recording.header
-    report = _plain_report(experiment, scored)
-    if experiment.report is not None:
+    if experiment.report is None:
+        report = _plain_report(experiment, scored)
+    else:
         report = experiment.report(scored, comparison, folder)
     described = run.scene.object
     return write_page(
