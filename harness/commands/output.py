@@ -165,10 +165,6 @@ class StepProgress:
         self._bar.console.print(line, markup=False)
         self._bar.advance(self._task)
 
-    def say(self, sentence: str) -> None:
-        """How the step that is being performed goes."""
-        self._bar.console.print(f"  {escape(sentence)}")
-
 
 @contextmanager
 def step_progress(done: int, total: int, noun: str = "step") -> Iterator[StepProgress]:

@@ -46,7 +46,7 @@ class AuthoredAudio:
     """of each way to the shapes at held-out nodes, ``"network"``, ``"nearest_trained"``, ``"linear"``, and
     ``"table_float16"`` at the nodes themselves: by a name with its unit."""
     settings: Mapping[str, str | float | int | bool | None]  #: how it was made.
-    seconds: Mapping[str, float]  #: s of ``"train"`` and ``"measure"`` (``stage_seconds.timed``).
+    seconds: Mapping[str, float]  #: s of ``"train"`` and ``"measure"`` (``solve.timed``).
 
 
 def author_audio(

@@ -26,7 +26,7 @@ from harness.sim.solid.intake import surface_of
 from harness.sim.solid.volume_mesh import read_volume
 
 STAGES = ("intake", "mesh", "assemble", "solve", "order", "train", "measure", "export", "verify")
-"""In their order; ``"order"`` gives signs and groups of modes one meaning (``audio_data.canonical``)."""
+"""In their order; ``"order"`` gives signs and groups of modes one meaning (``data.canonical``)."""
 
 MODES = 128
 """At most, where nobody asks for another number."""
@@ -42,7 +42,7 @@ _NEAR = 0.02
 
 @dataclass(frozen=True, eq=False)
 class AudioRequest(PartRequest):
-    """What is to be built, by a profile of ``audio_profiles.PROFILES``."""
+    """What is to be built, by a profile of ``profiles.PROFILES``."""
 
     limit: float = HEARING  #: Hz, modes up to there.
     most: int = MODES  #: modes at most, the lowest.
@@ -58,7 +58,7 @@ class BuiltAudio:
     audio: AuthoredAudio  #: its network and errors.
     said: tuple[str, ...]  #: what was done to the mesh and what to look at.
     seconds: Mapping[str, float]
-    """s of each of ``STAGES`` (``stage_seconds.timed``). Where modes were kept from an earlier solution,
+    """s of each of ``STAGES`` (``solve.timed``). Where modes were kept from an earlier solution,
     ``"mesh"``, ``"assemble"`` and ``"solve"`` are what they took then."""
 
 

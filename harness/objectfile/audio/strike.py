@@ -121,7 +121,7 @@ def strike(
         blow: that strikes there; its first touch is at the first sample.
         duration: s.
         rate: samples per second; modes at or above half of it are left out and named.
-        loudness: ``(m,)`` factor of each mode, as ``modal_radiation.radiation`` gives it; None for the modes
+        loudness: ``(m,)`` factor of each mode, as ``modal_sound.radiation`` gives it; None for the modes
             themselves.
         level: of the sum.
 

@@ -159,7 +159,7 @@ def solve_modes(
         limit: Hz, above zero.
         surface: onto which the nodes of the volume mesh's surface are moved; None for as it is.
         most: modes at most, the lowest; None for all up to the limit.
-        spent: s that earlier stages took (``stage_seconds.timed``), to be listed.
+        spent: s that earlier stages took (``solve.timed``), to be listed.
         undeformed: the same cells where ``surface`` belongs to them, if ``tetrahedra`` were moved
             away from it since; None if they were not.
         begin: called as each stage begins.

@@ -293,7 +293,7 @@ def solve_mesh(
         least: modes at least, if there are as many below the limit; a few more come with them.
         held: ``(n, 3)``, which displacement of which node is held at zero; None for a free object.
         rule: how mass is integrated.
-        spent: s that earlier stages took (``stage_seconds.timed``), to be listed; more is added to
+        spent: s that earlier stages took (``timed``), to be listed; more is added to
             ``"assembly"`` and ``"solve"``.
         begin: called as each stage begins.
 
