@@ -308,7 +308,8 @@ def run_each(
         for done in as_completed(running):
             yield running[done], done.result()
     except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
+        # The caller may remove a folder that the processes still write to.
+        pool.shutdown(wait=True, cancel_futures=True)
         raise
 
 
@@ -331,7 +332,7 @@ def perform_cells(
         pool: processes that perform the runs; None for this one.
         say: is given the reason for each run that cannot be planned or performed, and is left out.
     """
-    with TemporaryDirectory(prefix="touchstone-runs-") as folder:
+    with TemporaryDirectory(prefix="touchstone-runs-", ignore_cleanup_errors=True) as folder:
         trees = dump_scenes(scenes)
         perform = partial(_perform, name, trees, station, Path(folder))
         failed = {cell: why for cell, why in run_each(pool, perform, cells) if why is not None}
