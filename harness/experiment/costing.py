@@ -77,7 +77,8 @@ def measure(
                 for cell in cells:
                     points = known[cell]
                     if points is None:
-                        points = _measure(measured, cell, runs[cell], asked, say) if cell in runs else []
+                        files = runs.pop(cell, None)  # its pictures are released once it is answered
+                        points = [] if files is None else _measure(measured, cell, files, asked, say)
                         tree = {**stamp, "points": [_point_json(point) for point in points]}
                         write_text_whole(folder / f"{cell.name}.json", json.dumps(tree, allow_nan=False))
                     yield cell, points
