@@ -12,9 +12,7 @@ from harness.bench.experiments import loaded
 from harness.bench.gap import lasting_name
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
-from harness.experiment.begin import begin
 from harness.experiment.experiment import AnyExperiment
-from harness.experiment.perform import IN_PROCESS_BENCH, perform_on
 from harness.experiment.truth import truth_paths
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
@@ -56,6 +54,10 @@ def perform_run(
         station: a mocked station.
         folder: new folder of the run; the truth is written next to it.
     """
+    # A report imports this module for measured curves, and needs no simulator of the arm.
+    from harness.experiment.begin import begin
+    from harness.experiment.perform import IN_PROCESS_BENCH, perform_on
+
     recording = begin(experiment, scene, station, cell.seed, cell.gap, folder).recording
     run = RunFiles(recording)
     perform_on(experiment, loaded(IN_PROCESS_BENCH)(run.scene, run.station, run.context), run, Quiet())
