@@ -107,7 +107,7 @@ class Stub:
             agreement=self.agreement,
         )  # fmt: skip
         experiment = SimpleNamespace(
-            name="stub", title=self.title, plural="contacts", knobs=(SPACING,), measured="", budgets=None,
+            name="stub", title=self.title, plural="contacts", knobs=(SPACING,), measured="", measurement=None,
             report=lambda *_: self.report, lines=lambda _: ["a line of the terminal"],
         )  # fmt: skip
         return write_run_page(
