@@ -1,8 +1,8 @@
 """The reality gap: how the bench differs from what is believed of it, as a file of distributions.
 
 The mocked world samples a ``Gap`` once per run; no estimator reads it. A value is the sigma of a normal
-distribution with mean zero unless its attribute says otherwise. Estimators and comparisons use ``BenchErrors``
-alone, which a station may state as ``[errors]``.
+distribution with mean zero unless its attribute says otherwise. Estimators and comparisons use
+``BenchErrors`` alone, which a station may state as ``[errors]``.
 """
 
 from pathlib import Path
