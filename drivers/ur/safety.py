@@ -60,7 +60,7 @@ class SafetyLimits:
             ):
                 raise WrongUse(f"safety limits: the {name} from {low} to {high} is empty or not finite")
         for name, value in vars(self).items():
-            if isinstance(value, int | float) and not (math.isfinite(value) and value > 0):
+            if not name.endswith(("_low", "_high")) and not (math.isfinite(value) and value > 0):
                 raise WrongUse(f"safety limits: {name} = {value} must be a positive number")
         if self.speed_near > self.speed:
             raise WrongUse(f"safety limits: speed_near {self.speed_near} m/s is above speed {self.speed} m/s")

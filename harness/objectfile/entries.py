@@ -1,7 +1,6 @@
 """The tables of ``object.json``: files, what graphs take and give, where parts come from."""
 
 import re
-from dataclasses import astuple
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
@@ -74,12 +73,26 @@ class MaterialEntry(Entry):
 
     @classmethod
     def of(cls, material: Material) -> Self:
-        """Return the entry of a material, whose fields are in the same order."""
-        return cls.model_validate(dict(zip(cls.model_fields, astuple(material), strict=True)))
+        """Return the entry of a material."""
+        return cls(
+            name=material.name,
+            density_kg_per_m3=material.density,
+            young_pa=material.young,
+            poisson=material.poisson,
+            rayleigh_alpha_per_s=material.alpha,
+            rayleigh_beta_s=material.beta,
+        )
 
     def material(self) -> Material:
         """Return the material again."""
-        return Material(*self.model_dump().values())
+        return Material(
+            self.name,
+            self.density_kg_per_m3,
+            self.young_pa,
+            self.poisson,
+            self.rayleigh_alpha_per_s,
+            self.rayleigh_beta_s,
+        )
 
 
 class MeshEntry(FileEntry):

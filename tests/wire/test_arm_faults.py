@@ -247,7 +247,7 @@ def test_a_program_ended_at_the_pendant_at_rest_latches_too(
 def test_no_process_is_left_after_closing(arm: UrArm) -> None:
     pid = child_pid(arm)
     arm.close()
-    assert gone(pid)
+    assert gone(pid, 5.0)
 
 
 def freeze(pid: int, seconds: float) -> None:

@@ -93,7 +93,7 @@ def test_an_emergency_stop_takes_the_power(mock: UrProcess, receive: Any, contro
     wait_until(receive.isEmergencyStopped, 0.5)
     assert receive.getSafetyStatusBits() == 1 << 6 | 1 << 7 | 1 << 10
     assert (receive.getRobotMode(), receive.getRuntimeState()) == (3, 1)
-    wait_until(lambda: not control.isProgramRunning())  # by a stream of its own
+    wait_until(lambda: not control.isProgramRunning(), 5.0)  # by a stream of its own
     assert mock.ask("power on") == "Failed to execute: power on"
     mock.cue("release_emergency_stop")
     assert mock.ask("power on") == "Powering on"
@@ -109,7 +109,7 @@ def test_a_dropped_connection_is_noticed_at_once(mock: UrProcess, receive: Any) 
     stamp = receive.getTimestamp()
     mock.cue("drop", 1.0)
     # As long as for every other state here: mock and library share their cores with other tests.
-    wait_until(lambda: not receive.isConnected())
+    wait_until(lambda: not receive.isConnected(), 5.0)
     with pytest.raises(RuntimeError):
         RTDEReceiveInterface(mock.host, 125.0)
     time.sleep(1.1)
