@@ -131,10 +131,15 @@ class CatalogueStatus(Result):
 class PublishedCatalogue(Result):
     """The copy of a build."""
 
-    url: str
-    counts: Mapping[str, int]  #: number of objects by outcome.
-    bytes: int  #: sent now.
+    url: str = field(metadata=JSON_ONLY)
+    counts: Mapping[str, int] = field(metadata=JSON_ONLY)  #: number of objects by outcome.
+    bytes: int = field(metadata=JSON_ONLY)  #: sent now.
     objects: tuple[SentObject, ...] = field(metadata=JSON_ONLY)
+
+    def summary(self) -> tuple[str, ...]:
+        """State the number of objects by outcome and the amount sent."""
+        counts = ", ".join(f"{count} {outcome}" for outcome, count in self.counts.items())
+        return (f"{len(self.objects)} objects: {counts}; {self.bytes / 1e6:.3g} MB sent to {self.url}",)
 
 
 @dataclass(frozen=True)
