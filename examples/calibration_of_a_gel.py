@@ -5,5 +5,6 @@ from pathlib import Path
 
 import touchstone
 
-found = touchstone.calibrate_taxim(Path(sys.argv[1]), ball_radius=1.2e-3, pitch=1e-4)
+presses = Path(sys.argv[1])
+found = touchstone.calibrate_taxim(presses, ball_radius=1.2e-3, pitch=1e-4, out=presses / "calibration.npz")
 print("\n".join(found.summary()))

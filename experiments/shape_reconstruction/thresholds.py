@@ -5,7 +5,7 @@ Each row states its unit, then the bounded quantity and the reason; each section
 
 import numpy as np
 
-# Choice of the answer: choice, family/estimate, family/freedom, fits, reconstruct
+# Choice of the answer: family/estimate, family/freedom, fits, reconstruct
 MIN_CONTACTS = 6  # contacts: at different places that test whether an object is of the family
 MIN_LOG_ODDS = 2.0  # log-likelihood: of the smooth surface against the family: most objects are of the family
 PREDICTION_SCALE = 2.0e-3  # m: scale of the Cauchy density of a left-out contact: a slipped one counts little

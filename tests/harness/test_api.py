@@ -115,7 +115,7 @@ def test_a_gel_is_calibrated_by_pictures(tmp_path: Path) -> None:
         write_png(tmp_path / f"{index:02d}.png", image)
     write_png(tmp_path / "empty.png", drawn.background)
     assert "18 presses" in run("calibration_of_a_gel.py", str(tmp_path))
-    assert tmp_path.with_name(f"{tmp_path.name}_calibration.npz").exists()
+    assert (tmp_path / "calibration.npz").exists()
 
 
 def test_every_function_is_shown_in_an_example() -> None:
@@ -123,7 +123,7 @@ def test_every_function_is_shown_in_an_example() -> None:
     assert [name for name in FUNCTIONS if f"touchstone.{name}(" not in text] == []
 
 
-class Called(TouchstoneError):
+class _Called(TouchstoneError):
     """The function of the API was called."""
 
 
@@ -134,7 +134,7 @@ def test_a_command_calls_the_function_of_its_name(
     """The command parses and prints; the work is the function's."""
 
     def called(*_: object, **__: object) -> None:
-        raise Called(f"{name} was called")
+        raise _Called(f"{name} was called")
 
     monkeypatch.chdir(tmp_path)
     write_png(tmp_path / "a.png", np.zeros((120, 160, 3), np.uint8))
@@ -158,10 +158,10 @@ def test_the_other_two_are_shorter_forms(tmp_path: Path, monkeypatch: pytest.Mon
     assert places[0] == places[1]
 
     def called(*_: object, **__: object) -> None:
-        raise Called
+        raise _Called
 
     monkeypatch.setattr("harness.tasks.touch.render_touch", called)
-    with pytest.raises(Called):
+    with pytest.raises(_Called):
         tactile_image("builtin:mug", (-0.04, 0.0, 0.05))
 
 
