@@ -8,7 +8,7 @@ import typer
 
 from harness.basics.errors import WrongUse
 from harness.commands import options
-from harness.commands.output import CONSOLE, print_result, stopped
+from harness.commands.output import CONSOLE, print_result, print_stop
 
 if TYPE_CHECKING:
     from calibration.taxim.pictures import Channels
@@ -198,9 +198,9 @@ def taxim(
     )
     chosen(folder, wanted)
     try:
-        source = folder if folder is not None else pressed(wanted, json)
+        source = folder if folder is not None else perform_presses(wanted, json)
     except RunStopped as stop:
-        return stopped(stop, stop.folder, json)
+        return print_stop(stop, stop.folder, json)
     calibrated = api.calibrate_taxim(
         source,
         ball_radius=wanted.ball_radius,
@@ -273,7 +273,7 @@ def chosen(folder: Path | None, wanted: PressRequest) -> None:
         wanted.require_none()
 
 
-def pressed(wanted: PressRequest, as_json: bool) -> Path:
+def perform_presses(wanted: PressRequest, as_json: bool) -> Path:
     """Let the arm press, or go on with a run, and return its folder; ``RunStopped`` if Ctrl-C ended it."""
     from calibration.taxim.arm.press import procedure
     from calibration.taxim.arm.record import NAME

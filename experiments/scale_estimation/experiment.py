@@ -34,7 +34,7 @@ class ScaleMeasurement(Measurement):
     )
     counts = (4, 11)
 
-    def asked(
+    def list_answers(
         self,
         thorough: bool,
         chosen: Mapping[str, Sequence[str]],
@@ -42,8 +42,8 @@ class ScaleMeasurement(Measurement):
         counts: Sequence[int],
     ) -> list[tuple[int, Setting]]:
         """List the answers of a run: every level of the knob if a shape is known, its default if none is."""
-        asked = super().asked(thorough, chosen, scenes, counts)
-        return [one for one in asked if "known" in chosen["shape"] or one[1][STARTS.name] == STARTS.default]
+        answers = super().list_answers(thorough, chosen, scenes, counts)
+        return [one for one in answers if "known" in chosen["shape"] or one[1][STARTS.name] == STARTS.default]
 
 
 EXPERIMENT = Experiment(

@@ -87,7 +87,7 @@ def warn(sentence: str) -> None:
     CONSOLE.print(f"[yellow]note:[/] {escape(escape_message(sentence))}")
 
 
-def stopped(stop: TouchstoneError, folder: Path, as_json: bool) -> int:
+def print_stop(stop: TouchstoneError, folder: Path, as_json: bool) -> int:
     """Print that Ctrl-C ended a session after a step, and how to resume it; return the exit code."""
     CONSOLE.print(str(stop), markup=False)
     if as_json:

@@ -51,7 +51,7 @@ def answer_as_asked(experiment: AnyExperiment, files: RunFiles, front: Front, ta
     require_steps(experiment, files.recording)
     measured = measurement_of(experiment)
     run = measured.solver(files)
-    front = front.fitting(run.unfit)
+    front = front.fitting(run.explain_refusal)
     asked = ask(run, front, target)
     run.prepare(measured.finest)
     _, shared = run.read(measured.finest)
@@ -134,7 +134,7 @@ def _candidates(run: Solver, front: Front, target: Target) -> tuple[Point, ...]:
         if point is chosen.point
         or (
             most_seconds(point, name, front.scale, work=work) < 0.7 * chosen.seconds
-            and run.prepared_alike(point.levels, chosen.point.levels)
+            and run.shares_preparation(point.levels, chosen.point.levels)
         )
     ]
     cheapest = min(front.points, key=lambda point: most_seconds(point, name, front.scale, work=work))

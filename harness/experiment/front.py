@@ -82,7 +82,7 @@ def front_for(experiment: AnyExperiment, scene: SceneFile, steps: int) -> Front:
         )
     reasons = stale(curve, machine(), code(measured.estimator))
     front = front_of(experiment, curve, {**like, experiment.plural: steps}, reasons, shipped is not None)
-    return front.fitting(lambda setting: measured.unfit(scene, setting))
+    return front.fitting(lambda setting: measured.explain_refusal(scene, setting))
 
 
 def front_at_hand(experiment: AnyExperiment, run: RunFiles) -> Front | None:
@@ -112,10 +112,10 @@ def front_of(
     Raises:
         WrongUse: nothing like the condition was measured.
     """
-    count, offered = experiment.plural, measurement_of(experiment).offered
+    count, is_offered = experiment.plural, measurement_of(experiment).is_offered
     condition, scale = nearest_condition(curve.conditions(), wanted, count)
     measured = curve.where(condition)
-    points = tuple(point for point in measured if offered(point.levels)) or measured
+    points = tuple(point for point in measured if is_offered(point.levels)) or measured
     return Front(points, scale, int(condition[count]), tuple(reasons), curve.made, shipped)
 
 

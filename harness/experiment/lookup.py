@@ -12,7 +12,7 @@ from harness.experiment.experiment import AnyExperiment
 from harness.recording.recording import Recording
 
 
-def named(name: str) -> AnyExperiment:
+def find_experiment(name: str) -> AnyExperiment:
     """Return the experiment of this name.
 
     Raises:
@@ -37,7 +37,7 @@ def experiment_of(recording: Recording) -> AnyExperiment:
             f"{recording.folder} is a run of `touchstone {row.command}`; read it with "
             f"`touchstone {row.command} {recording.folder}`"
         )
-    return named(name)
+    return find_experiment(name)
 
 
 def require_of(recording: Recording, name: str, doing: str) -> None:

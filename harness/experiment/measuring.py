@@ -22,7 +22,7 @@ from harness.effects.accuracy import Accuracy, Level, Setting
 from harness.experiment.experiment import Answering, AnyExperiment, Scored
 from harness.experiment.in_process import RunCell, open_run, record_run
 from harness.experiment.levels import chosen_levels
-from harness.experiment.lookup import named
+from harness.experiment.lookup import find_experiment
 from harness.experiment.solving import Solved, Solver
 from harness.experiment.subjects import REAL, object_key
 from harness.experiment.truth import read_truth
@@ -79,14 +79,14 @@ class PlainRun:
         """Return the run with its first steps alone."""
         return replace(self, steps=steps)
 
-    def unfit(self, _setting: Setting) -> None:
+    def explain_refusal(self, _setting: Setting) -> None:
         """Return None: every setting can be answered."""
 
     def prepare(self, setting: Setting) -> None:
         """Create the readings once: an experiment then computes and loads what it needs."""
         self._answering(setting)
 
-    def prepared_alike(self, _one: Setting, _other: Setting) -> bool:
+    def shares_preparation(self, _one: Setting, _other: Setting) -> bool:
         """Return True."""
         return True
 
@@ -200,7 +200,7 @@ class Measurement:
                 rows[title] = solved.found
             return {"schema": 1, "cell": vars(cell), self.experiment.plural: run.steps, "rows": rows}
 
-    def asked(
+    def list_answers(
         self,
         _thorough: bool,
         _chosen: Mapping[str, Sequence[str]],
@@ -248,7 +248,7 @@ class Measurement:
         """Return the condition of a scene's runs as a curve has it, without the number of steps."""
         return {"gap": "default"}
 
-    def unfit(self, _scene: SceneFile, setting: Setting) -> str | None:
+    def explain_refusal(self, _scene: SceneFile, setting: Setting) -> str | None:
         """Return why a scene's runs cannot be answered at a setting of a stored curve; None if they can."""
         try:
             Accuracy(self.experiment.own_knobs, setting)
@@ -257,7 +257,7 @@ class Measurement:
             return f"{refusal}; measure what accuracy costs again: touchstone cost {name}"
         return None
 
-    def offered(self, _setting: Setting) -> bool:
+    def is_offered(self, _setting: Setting) -> bool:
         """Return whether a setting is chosen while there are others."""
         return True
 
@@ -347,7 +347,7 @@ def _perform(
     """Perform a run into a folder of recordings; return the reason if it cannot be."""
     scene = cell.create_scene(scene_from_json(trees[cell.object], "the cost of accuracy"))
     try:
-        record_run(named(name), cell, scene, station, folder)
+        record_run(find_experiment(name), cell, scene, station, folder)
     except TouchstoneError as error:
         return str(error)
     return None

@@ -65,13 +65,13 @@ class Solver(Protocol):
     def first(self, steps: int) -> "Solver":
         """Return the readings of the first steps alone."""
 
-    def unfit(self, setting: Setting) -> str | None:
+    def explain_refusal(self, setting: Setting) -> str | None:
         """Return why these readings cannot be answered at a setting; None if they can."""
 
     def prepare(self, setting: Setting) -> None:
         """Compute what a setting needs of the object alone and load its kernels; no budget counts it."""
 
-    def prepared_alike(self, one: Setting, other: Setting) -> bool:
+    def shares_preparation(self, one: Setting, other: Setting) -> bool:
         """Return whether ``one`` needs nothing prepared that ``other`` does not."""
 
     def work(self, setting: Setting) -> float:

@@ -17,7 +17,7 @@ from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import load_station, station_path
 from harness.experiment.experiment import AnyExperiment
 from harness.experiment.in_process import RunCell
-from harness.experiment.lookup import named
+from harness.experiment.lookup import find_experiment
 from harness.experiment.measuring import Measurement, dump_scenes, run_each, table_of, workers_of
 
 KEYS = "scene.keys.json"
@@ -83,7 +83,7 @@ def measure(
 def _run(name: str, trees: Mapping[str, JsonObject], recordings: Path | None, cell: RunCell) -> JsonObject:
     scene, station = scene_from_json(trees[cell.object], "the table"), load_station(station_path("mock"))
     try:
-        return table_of(named(name)).run_cell(cell, scene, station, recordings)
+        return table_of(find_experiment(name)).run_cell(cell, scene, station, recordings)
     except TouchstoneError as error:
         # A run that cannot be planned or performed is reported as such; it is no measurement.
         return {"schema": 1, "failed": f"{type(error).__name__}: {error}"}

@@ -22,7 +22,7 @@ from harness.cost.provenance import code, machine, stale
 from harness.experiment.costing import gather_curve, join_curves
 from harness.experiment.costing import measure as measure_costs
 from harness.experiment.in_process import RunCell
-from harness.experiment.lookup import named
+from harness.experiment.lookup import find_experiment
 from harness.experiment.measuring import MeasuredColumn, Measurement, measurement_of, table_of
 from harness.experiment.subjects import find_data_folder, objects
 from harness.experiment.tables import (
@@ -137,7 +137,7 @@ def measure_cost(
         WrongUse: an unknown object, condition, level or gap.
         DataRefused: no run could be performed.
     """
-    kind = named(experiment)
+    kind = find_experiment(experiment)
     measured = measurement_of(kind)
     out = out or Path("runs/cost") / kind.name
     scenes = _scenes(only, scene)
@@ -145,7 +145,7 @@ def measure_cost(
         raise WrongUse(f"--gap {gap!r} is not known; {nearest(gap, ('default', 'none'))}")
     chosen = {**_levels(measured, levels or {}, where), "gap": [gap]}
     wanted = measured.cells(list(scenes), seeds, chosen)
-    asked = measured.asked(thorough, chosen, scenes, sorted(set(steps or measured.counts)))
+    asked = measured.list_answers(thorough, chosen, scenes, sorted(set(steps or measured.counts)))
     station, points = load_station(station_path("mock")), list[Point]()
     with hold_folder(out), progress(len(wanted)) as advance:
         for _, found in measure_costs(
@@ -292,7 +292,7 @@ def measure_table(
     Raises:
         WrongUse: an unknown object, condition, level, gap or key; or no run could be performed.
     """
-    kind = named(experiment)
+    kind = find_experiment(experiment)
     measured = table_of(kind)
     out = out or Path("runs/tables") / kind.name
     folder = data or find_data_folder()

@@ -33,7 +33,7 @@ from harness.experiment.budget import answer_as_asked, sentences
 from harness.experiment.experiment import Answering, AnyExperiment, AnyScored, Procedure
 from harness.experiment.front import doubts, foresee, front_for
 from harness.experiment.levels import chosen_levels
-from harness.experiment.lookup import experiment_of, named, require_of
+from harness.experiment.lookup import experiment_of, find_experiment, require_of
 from harness.experiment.perform import Performed, describe_bench, perform_on_bench, steps_planned
 from harness.experiment.solving import Target, target_of
 from harness.recording.recording import Recording
@@ -109,20 +109,20 @@ class RunWatcher:
 
     ask: Ask | None = None  #: shows the operator what to do by hand; None if there is no operator.
 
-    def planned(self, run: PlannedRun, begun: Begun) -> None:
+    def show_plan(self, run: PlannedRun, begun: Begun) -> None:
         """Receive a new run and its rehearsed plan before anything moves; an error raised here ends it."""
 
-    def say(self, sentence: str) -> None:
+    def report(self, sentence: str) -> None:
         """Receive a sentence about the progress."""
 
     def warn(self, sentence: str) -> None:
         """Receive a warning."""
 
-    def session(self, _done: int, _total: int, _noun: str) -> AbstractContextManager[Progress]:
+    def track_steps(self, _done: int, _total: int, _noun: str) -> AbstractContextManager[Progress]:
         """Return a context of the object that receives the beginning and the end of each step."""
         return nullcontext(Quiet())
 
-    def answered(self, lines: Sequence[str]) -> None:
+    def show_answer(self, lines: Sequence[str]) -> None:
         """Receive the answer in words, before the report is drawn."""
 
 
@@ -177,9 +177,9 @@ def run(
             **vars(scene),
             **scene.keys,
         }
-        planned = _resumed(resume, experiment, given, levels, _target(budget, error, levels), watcher)
+        planned = _open_to_resume(resume, experiment, given, levels, _target(budget, error, levels), watcher)
     else:
-        kind = named(experiment or DEFAULT_EXPERIMENT)
+        kind = find_experiment(experiment or DEFAULT_EXPERIMENT)
         if error is not None and kind.error_key is not None:  # the run itself ends when that is met
             scene, error = scene.with_key(kind.error_key, f"{error!r}m"), None
         target = _target(budget, error, levels)
@@ -188,22 +188,22 @@ def run(
         accuracy = chosen_levels(kind.knobs, levels, scene_levels(resolved))
         place = load_station(station_path(station or "mock"))
         if target is not None:
-            watcher.say(foresee(kind, resolved, target))
+            watcher.report(foresee(kind, resolved, target))
         elif kind.section is not None and kind.error_key is not None:
             stated = vars(resolved.section(kind.section))[kind.error_key]
             if stated is not None:  # such an experiment has no curve
-                watcher.say(
+                watcher.report(
                     f"no curve promises an error of {kind.name} in advance: the run ends when its own "
                     f"estimate states {1e3 * stated:g} mm or less, at the latest after its last {kind.step}"
                 )
         begun = begin(kind, resolved, place, seed, gap, out, bench, target)
         planned = PlannedRun(kind, RunFiles(begun.recording), accuracy, target)
-        watcher.planned(planned, begun)
+        watcher.show_plan(planned, begun)
     with planned.files.recording.hold():
         return _perform_and_answer(planned, watcher)
 
 
-def _resumed(
+def _open_to_resume(
     folder: Path,
     experiment: str | None,
     given: Mapping[str, object],
@@ -227,11 +227,11 @@ def _resumed(
     recording = Recording(folder)
     kind = experiment_of(recording)
     if experiment is not None:
-        require_of(recording, named(experiment).name, "--resume")
+        require_of(recording, find_experiment(experiment).name, "--resume")
     files = RunFiles(recording)
     accuracy = chosen_levels(kind.knobs, levels, files.network_levels)
     if target is not None and recording.committed < steps_planned(kind, recording):
-        watcher.say(foresee(kind, files.scene, target))
+        watcher.report(foresee(kind, files.scene, target))
     if target is None and not levels:
         target = target_of(recording.header.plan)
     return PlannedRun(kind, files, accuracy, target)
@@ -273,17 +273,17 @@ def perform_run(
     total = steps_planned(procedure, recording)
     if recording.committed == total:
         return Performed(True, {})
-    watcher.say(f"bench: {describe_bench(recording)}")
-    watcher.say(f"recording to {recording.folder}")
+    watcher.report(f"bench: {describe_bench(recording)}")
+    watcher.report(f"recording to {recording.folder}")
     try:
-        with watcher.session(recording.committed, total, procedure.step) as progress:
+        with watcher.track_steps(recording.committed, total, procedure.step) as progress:
             done = perform_on_bench(
                 procedure,
                 files,
                 progress,
                 watcher.ask,
                 accuracy,
-                say=lambda sentence: watcher.say(f"  {sentence}"),
+                say=lambda sentence: watcher.report(f"  {sentence}"),
                 conclude=conclude,
             )
     except TouchstoneError:
@@ -321,10 +321,10 @@ def _perform_and_answer(run: PlannedRun, watcher: RunWatcher) -> RunResult:
         front = front_for(experiment, run.files.scene, recording.committed)
         for doubt in doubts(experiment, front, run.target):
             watcher.warn(doubt)
-        watcher.say("estimating as asked, then at the finest levels")
+        watcher.report("estimating as asked, then at the finest levels")
         cost = answer_as_asked(experiment, run.files, front, run.target)
         for sentence in sentences(experiment, cost):
-            watcher.say(sentence)
+            watcher.report(sentence)
         accuracy, more = run.accuracy.with_(cost["levels"]), {"cost": cost}
     result = finish(
         experiment,
@@ -343,7 +343,7 @@ def _perform_and_answer(run: PlannedRun, watcher: RunWatcher) -> RunResult:
 def _publish(experiment: AnyExperiment, watcher: RunWatcher, result: JsonObject) -> None:
     for warning in result["warnings"]:
         watcher.warn(warning)
-    watcher.answered(experiment.lines(result))
+    watcher.show_answer(experiment.lines(result))
 
 
 def replay(

@@ -126,7 +126,7 @@ def _front(curve: Curve, cell: RunCell, run: Solver, reasons: Sequence[str]) -> 
         **{name: conditions[name] for name in ("spacing", "gap", "yaw")},
         "contacts": CONTACTS,
     }
-    return front_of(EXPERIMENT, curve, wanted, reasons, shipped=False).fitting(run.unfit)
+    return front_of(EXPERIMENT, curve, wanted, reasons, shipped=False).fitting(run.explain_refusal)
 
 
 def _record(cell: RunCell, run: Solver, front: Front) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import Effect, Facts, knobs_of, needs_of
 from harness.effects.plan import default_accuracy, plan
 from harness.experiment.compare import CARRIED
-from harness.experiment.lookup import named
+from harness.experiment.lookup import find_experiment
 from harness.objectfile.description import Description
 from harness.objectfile.published.entries import PublishedDescription
 from harness.recording.recording import SCHEMA, RunHeader
@@ -155,7 +155,8 @@ def _effects() -> list[str]:
     lines += ["", "## Dials of the simulation", "", "Levels run from cheap to exact.", ""]
     lines += _dials(knobs_of(EFFECTS))
     for name in experiment_names():
-        lines += ["", f"## Dials of {name}", "", EXPERIMENTS[name].about, "", *_dials(named(name).own_knobs)]
+        own = _dials(find_experiment(name).own_knobs)
+        lines += ["", f"## Dials of {name}", "", EXPERIMENTS[name].about, "", *own]
     return lines
 
 
@@ -188,7 +189,7 @@ def _observed(effect: Effect) -> str:
     made = described_sensor("gelsight-r1.5").sensor
     marked = replace(made, casts_shadow=True, markers=MarkerGrid(7, 9, 2e-3, 4e-4))
     plain, rich = Facts(scene, made), Facts(scene.model_copy(update={"object": named_file}), marked)
-    given = {*CARRIED, *(name for experiment in experiment_names() for name in named(experiment).gives)}
+    given = set(CARRIED).union(*(find_experiment(name).gives for name in experiment_names()))
     for facts, carried in ((plain, given), (rich, {*given, "sensor.shadow_table"})):
         try:
             sources = plan(EFFECTS, facts, (effect.provides,), default_accuracy(EFFECTS)).sources

@@ -7,7 +7,7 @@ import pytest
 
 from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import finish
-from harness.experiment.lookup import named
+from harness.experiment.lookup import find_experiment
 from harness.recording.run_folder import RunFiles
 from tests.docs.reference import FOLDER, pages
 from tests.docs.result_keys import ASKED, COMMON, ESTIMATE, LOCALIZATION
@@ -27,7 +27,7 @@ def test_there_is_no_other_page() -> None:
 
 def test_a_result_has_the_keys_that_the_page_lists(tmp_path: Path) -> None:
     recording = in_process_run(tmp_path / "run", touch_scene(contacts=1), seed=3)
-    experiment = named("contact-localization")
+    experiment = find_experiment("contact-localization")
 
     def page(*_: Any) -> Path:
         return tmp_path / "page.html"

@@ -330,7 +330,7 @@ def test_fewer_contacts_are_measured_at_few_settings(monkeypatch: pytest.MonkeyP
     module = "experiments.contact_localization.accuracy.measurement"
     monkeypatch.setattr(f"{module}.settings", lambda *_asked: [COARSE, DEFAULT])
     monkeypatch.setattr(f"{module}.settings_by_count", lambda _sound: [DEFAULT])
-    few = measurement_of(EXPERIMENT).asked(False, {"sense": ["touch"]}, objects(None), (2, 4, 6))
+    few = measurement_of(EXPERIMENT).list_answers(False, {"sense": ["touch"]}, objects(None), (2, 4, 6))
     assert few == [(2, DEFAULT), (4, DEFAULT), (6, COARSE), (6, DEFAULT)]
 
 

@@ -23,7 +23,7 @@ from harness.effects.accuracy import Accuracy, Setting
 from harness.experiment.answer import WrittenAnswer, add_report, write_answer
 from harness.experiment.begin import begin
 from harness.experiment.experiment import Answering
-from harness.experiment.lookup import named
+from harness.experiment.lookup import find_experiment
 from harness.experiment.perform import Performed, perform_on_bench
 from harness.experiment.report_content import COUNT
 from harness.recording import run_folder
@@ -113,7 +113,7 @@ def scene_of(name: str) -> SceneFile:
 
 
 def accuracy_of(name: str) -> Accuracy:
-    return Accuracy.default(named(name).knobs).with_(LEVELS.get(name, {}))
+    return Accuracy.default(find_experiment(name).knobs).with_(LEVELS.get(name, {}))
 
 
 @pytest.fixture(scope="module", params=SCENES)
@@ -121,7 +121,8 @@ def whole(
     request: pytest.FixtureRequest, station: Station, tmp_path_factory: pytest.TempPathFactory
 ) -> Whole:
     name, folder = str(request.param), tmp_path_factory.mktemp("whole")
-    experiment, accuracy, written = named(name), accuracy_of(name), list[WrittenAnswer[Answering, object]]()
+    experiment, accuracy = find_experiment(name), accuracy_of(name)
+    written = list[WrittenAnswer[Answering, object]]()
     run = RunFiles(begin(experiment, scene_of(name), station, 3, None, folder / "run").recording)
 
     def conclude(done: Performed) -> None:
@@ -167,7 +168,7 @@ def test_pages_of_all_experiments_have_one_form(whole: Whole) -> None:
     assert rows
     assert all(quantity and value for quantity, value, *_ in rows)
     assert {unit for _, _, unit, _ in rows} <= UNITS
-    for knob in named(whole.name).knobs:
+    for knob in find_experiment(whole.name).knobs:
         assert f"{knob.name} {whole.result['accuracy'][knob.name]}" in page.text
 
 
@@ -176,7 +177,7 @@ def test_no_page_shows_python_or_lines_of_the_terminal(whole: Whole) -> None:
     for token in ("[0.", "{'", "array(", "_m ", "<class"):
         assert token not in text
     assert not {"None", "nan", "True", "False"} & set(re.findall(r"\w+", text))
-    assert not [line for line in named(whole.name).lines(whole.result) if line in text]
+    assert not [line for line in find_experiment(whole.name).lines(whole.result) if line in text]
 
 
 def test_no_kernel_is_loaded_between_the_first_step_and_the_answer(whole: Whole) -> None:
@@ -190,7 +191,7 @@ def answer_recording(name: str, folder: str) -> None:
     from numba.core.event import install_recorder
 
     run = RunFiles(Recording(Path(folder)))
-    experiment = named(name)
+    experiment = find_experiment(name)
     answering = experiment.answering(run, accuracy_of(name))
     records = run.recording.steps()
     with install_recorder("numba:compiler_lock") as loads:

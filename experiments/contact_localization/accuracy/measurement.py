@@ -162,7 +162,7 @@ class ContactMeasurement(Measurement):
             contacts = files.recording.committed
             return {"schema": 1, "cell": vars(cell), "contacts": contacts, "rows": rows}
 
-    def asked(
+    def list_answers(
         self,
         thorough: bool,
         chosen: Mapping[str, Sequence[str]],
@@ -207,14 +207,14 @@ class ContactMeasurement(Measurement):
         # A real bench has a gap, and a mocked one without a gap is only easier.
         return {"spacing": section.spacing, "gap": "default", "yaw": section.yaw}
 
-    def unfit(self, scene: SceneFile, setting: Setting) -> str | None:
+    def explain_refusal(self, scene: SceneFile, setting: Setting) -> str | None:
         """Return why a scene's runs cannot be answered at a setting; None if they can."""
         if needs_sound(setting) and not scene.sensors.sound:
             return SILENT
         networks = any(setting.get(knob.name, knob.default) != knob.default for knob in (SHAPES, TOUCH))
         return _NO_OBJECTFILE if networks and scene.object.objectfile is None else None
 
-    def offered(self, setting: Setting) -> bool:
+    def is_offered(self, setting: Setting) -> bool:
         """Return whether modes are of the default elements.
 
         Coarser elements are measured for what they cost in accuracy; they are quicker once per object. Of

@@ -54,7 +54,7 @@ class ContactRun:
         """Return the run with its first contacts alone."""
         return replace(self, observations=self.observations[:steps])
 
-    def unfit(self, setting: Setting) -> str | None:
+    def explain_refusal(self, setting: Setting) -> str | None:
         """Return why a setting cannot be answered: it needs sound and no contact was struck."""
         struck = any(observation.strike is not None for observation in self.observations)
         return SILENT if needs_sound(setting) and not struck else None
@@ -63,7 +63,7 @@ class ContactRun:
         """Compute the object's samples and modes, and load the kernels."""
         prepare(self.models.at(setting), setting)
 
-    def prepared_alike(self, one: Setting, other: Setting) -> bool:
+    def shares_preparation(self, one: Setting, other: Setting) -> bool:
         """Return whether samples and modes are the same, as far as ``one`` needs them."""
         varied = SIMULATED if needs_sound(one) else (TOUCH,)
         simulated = all(one.get(knob.name) == other.get(knob.name) for knob in varied)

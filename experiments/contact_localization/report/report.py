@@ -29,7 +29,7 @@ from harness.basics.geometry import inverse, transform
 from harness.effects.quantities import Quantities
 from harness.experiment.compare import Comparison
 from harness.experiment.front import front_at_hand
-from harness.experiment.lookup import named
+from harness.experiment.lookup import find_experiment
 from harness.experiment.report_content import (
     COUNT,
     AnswerValue,
@@ -235,7 +235,7 @@ def _curve(sense: Senses, history: History, true: FloatArray) -> ErrorCurve:
 
 def _by_seconds(scored: ScoredContact, true: FloatArray) -> tuple[ErrorCurve, ...]:
     """Return error and seconds of each sense's answer, and those measured at its levels on other runs."""
-    count, front = len(true), front_at_hand(named(PROGRAM), scored.run)
+    count, front = len(true), front_at_hand(find_experiment(PROGRAM), scored.run)
     unused = (PARTICLES,) if scored.accuracy.of(METHOD) == "grid" else (ROUNDS, SAMPLES)
     curves = []
     for sense, last in {scored.found.sense: scored.found.last, **scored.found.others}.items():

@@ -8,7 +8,7 @@ import typer
 
 from harness.bench.experiments import DEFAULT_EXPERIMENT, experiment_names
 from harness.commands import options
-from harness.commands.output import print_result, stopped
+from harness.commands.output import print_result, print_stop
 
 RUNNABLE = experiment_names()
 
@@ -127,6 +127,6 @@ def run(
             watcher=TerminalWatcher(json),
         )
     except RunStopped as stop:
-        return stopped(stop, stop.folder, json)
+        return print_stop(stop, stop.folder, json)
     print_result(made, json)
     return 0

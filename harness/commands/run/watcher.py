@@ -18,7 +18,7 @@ class TerminalWatcher(RunWatcher):
         self._as_json = as_json
         self.ask = None if as_json else partial(CONSOLE.print, markup=False, style="bold")
 
-    def say(self, sentence: str) -> None:
+    def report(self, sentence: str) -> None:
         """Print a sentence about the progress."""
         CONSOLE.print(sentence, markup=False)
 
@@ -26,22 +26,22 @@ class TerminalWatcher(RunWatcher):
         """Print a warning."""
         warn(sentence)
 
-    def session(self, done: int, total: int, noun: str) -> AbstractContextManager[Progress]:
+    def track_steps(self, done: int, total: int, noun: str) -> AbstractContextManager[Progress]:
         """Show a progress bar over the steps."""
         return step_progress(done, total, noun)
 
-    def answered(self, lines: Sequence[str]) -> None:
+    def show_answer(self, lines: Sequence[str]) -> None:
         """Print the answer in words."""
         if not self._as_json:
             for line in lines:
                 ANSWERS.print(line, markup=False)
-            self.say("comparing with the simulation, drawing the report")
+            self.report("comparing with the simulation, drawing the report")
 
-    def planned(self, run: PlannedRun, begun: Begun) -> None:
+    def show_plan(self, run: PlannedRun, begun: Begun) -> None:
         """Print what is about to happen, and what is simulated at which levels."""
         experiment, files = run.experiment, run.files
         for line in begun.known.read:
-            self.say(line)
+            self.report(line)
         section = {} if experiment.section is None else vars(files.scene.section(experiment.section))
         spaced = f", {section['spacing']}" if section.get("spacing") is not None else ""
         later, waiting = begun.plan.on_the_way, ""
@@ -49,12 +49,12 @@ class TerminalWatcher(RunWatcher):
             what = f"{later} {experiment.plural} are" if later > 1 else f"1 {experiment.step} is"
             waiting = f"; {what} planned, and rehearsed, once those before are read"
         low, high = files.mesh.bounds
-        self.say(
+        self.report(
             f"{files.scene.object.name}: {len(files.mesh.faces)} faces, longest side "
             f"{1e3 * (high - low).max():.0f} mm; {len(begun.plan.steps)} {experiment.plural}{spaced}; "
             f"station {files.station.title}"
         )
-        self.say(
+        self.report(
             f"rehearsed in the twin: {begun.plan.rehearsal.segments} motions, none refused; "
             f"{len(begun.plan.rehearsal.warnings)} warnings{waiting}"
         )
@@ -63,6 +63,6 @@ class TerminalWatcher(RunWatcher):
         networks = networks_in_use(files.scene, effects)
         if networks:
             CONSOLE.print(networks_as_table(networks))
-        self.say("not simulated:")
+        self.report("not simulated:")
         for sentence in left_out(effects):
-            self.say(f"  {sentence}")
+            self.report(f"  {sentence}")

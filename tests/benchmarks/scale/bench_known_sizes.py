@@ -18,7 +18,7 @@ from harness.bench.scene import SceneFile, scene_from_json, scene_from_options
 from harness.bench.station_file import Station, load_station, station_path
 from harness.effects.accuracy import Accuracy
 from harness.experiment.in_process import open_run
-from harness.experiment.lookup import named
+from harness.experiment.lookup import find_experiment
 from harness.experiment.truth import read_truth
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell
@@ -73,7 +73,7 @@ def answer_run(
     tree = cell.create_scene(scene).model_dump(mode="json", by_alias=True)
     tree["sensors"].update(sound=False)
     silent = scene_from_json(tree, cell.name)
-    experiment = named("scale-estimation")
+    experiment = find_experiment("scale-estimation")
     with open_run(experiment, cell, silent, station, recordings) as run:
         recording = run.recording
         answering = ScaleAnswering(run, Accuracy.default(KNOBS))

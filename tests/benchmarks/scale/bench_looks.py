@@ -17,7 +17,7 @@ from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import Station, load_station, station_path
 from harness.effects.accuracy import Accuracy
 from harness.experiment.in_process import open_run
-from harness.experiment.lookup import named
+from harness.experiment.lookup import find_experiment
 from harness.experiment.subjects import objects
 from harness.experiment.truth import read_truth
 from harness.picture.outline import SeenOutline
@@ -53,7 +53,7 @@ def look(cell: ScaleCell, scene: SceneFile, station: Station) -> Row:
     tree["scale"]["contacts"] = 0
     tree["sensors"].update(sound=False, touch=False)
     looks = scene_from_json(tree, cell.name)
-    with open_run(named("scale-estimation"), cell, looks, station) as run:
+    with open_run(find_experiment("scale-estimation"), cell, looks, station) as run:
         recording = run.recording
         answering = ScaleAnswering(run, Accuracy.default(KNOBS))
         for record in recording.steps():

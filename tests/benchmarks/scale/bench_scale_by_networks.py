@@ -23,7 +23,7 @@ from harness.bench.station_file import Station, load_station, station_path
 from harness.effects.sound import SHAPES
 from harness.experiment.in_process import open_run
 from harness.experiment.levels import chosen_levels
-from harness.experiment.lookup import named
+from harness.experiment.lookup import find_experiment
 from harness.experiment.truth import read_truth
 from tests.benchmarks.results import benchmark_parser, finish_figure
 from tests.docs.results import Cell
@@ -45,7 +45,7 @@ class AnsweredSize:
 def answered(cell: ScaleCell, scene: SceneFile, station: Station) -> Iterator[AnsweredSize]:
     """A run at both levels."""
     here = cell.create_scene(scene)
-    with open_run(named("scale-estimation"), cell, here, station) as run:
+    with open_run(find_experiment("scale-estimation"), cell, here, station) as run:
         recording = run.recording
         truth = read_truth(recording)
         assert truth is not None, "no instrument read anything in this run"

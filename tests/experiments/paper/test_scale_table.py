@@ -96,5 +96,5 @@ def test_networks_that_answer_a_run_are_no_part_of_it() -> None:
 def test_a_cost_curve_turns_the_dial_that_the_answer_depends_on(
     shapes: list[str], levels: Sequence[int]
 ) -> None:
-    asked = measurement_of(EXPERIMENT).asked(False, {"shape": shapes}, {}, (4,))
+    asked = measurement_of(EXPERIMENT).list_answers(False, {"shape": shapes}, {}, (4,))
     assert {setting[STARTS.name] for _, setting in asked} == set(levels)

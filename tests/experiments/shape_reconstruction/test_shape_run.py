@@ -297,5 +297,5 @@ def test_a_removed_method_is_refused_and_a_stored_one_is_replaced(level: str) ->
     assert current_levels([METHOD], {METHOD.name: level}) == {METHOD.name: REMOVED[level]}
     measured = measurement_of(EXPERIMENT)
     scene = scene_from_json({"schema": 1, "object": {"mesh": "builtin:mug"}}, "mug")
-    assert "touchstone cost" in str(measured.unfit(scene, {METHOD.name: level}))
-    assert measured.unfit(scene, {METHOD.name: QUICK}) is None
+    assert "touchstone cost" in str(measured.explain_refusal(scene, {METHOD.name: level}))
+    assert measured.explain_refusal(scene, {METHOD.name: QUICK}) is None

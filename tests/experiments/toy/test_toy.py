@@ -16,7 +16,7 @@ from harness.cost.file import curve_path, save
 from harness.cost.provenance import code, machine
 from harness.effects.scene_object import known_object
 from harness.experiment.in_process import RunCell, open_run
-from harness.experiment.lookup import named
+from harness.experiment.lookup import find_experiment
 from harness.experiment.measuring import measurement_of
 from harness.experiment.subjects import object_key
 from harness.experiment.truth import read_true_surface
@@ -103,11 +103,11 @@ def test_its_table_reproduces_from_its_recordings(tmp_path: Path, capsys: pytest
 def test_recordings_of_another_scene_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     cell, station = RunCell("mug", "none", 3), load_station(station_path("mock"))
     scene = scene_from_options("builtin:mug")
-    with open_run(named("toy"), cell, scene, station, tmp_path):
+    with open_run(find_experiment("toy"), cell, scene, station, tmp_path):
         pass
     bowl = scene_from_options("builtin:bowl")
     refused = pytest.raises(WrongUse, match="differs in object")
-    with refused, open_run(named("toy"), cell, bowl, station, tmp_path):
+    with refused, open_run(find_experiment("toy"), cell, bowl, station, tmp_path):
         pass
 
 
@@ -126,7 +126,7 @@ def save_a_curve() -> None:
         return Point(f"stride {stride}", {STRIDE.name: stride}, {"gap": "default", "presses": 1}, samples)
 
     points = (point(8, 0.5, 4e-3), point(1, 2.0, 1e-3))
-    here = code(measurement_of(named("toy")).estimator)
+    here = code(measurement_of(find_experiment("toy")).estimator)
     save(Curve("toy", points, machine(), here, "2026-01-01T00:00:00+00:00", "T"), curve_path("toy"))
 
 

@@ -9,7 +9,7 @@ import pytest
 from harness.basics.errors import WrongUse
 from harness.bench.scene import scene_from_options
 from harness.experiment.in_process import RunCell
-from harness.experiment.lookup import named
+from harness.experiment.lookup import find_experiment
 from harness.experiment.measuring import MeasuredColumn, Measurement
 from harness.experiment.subjects import REAL, objects
 from harness.experiment.tables import by_object, require_same_keys, rows
@@ -34,7 +34,7 @@ def test_a_folder_of_runs_without_keys_takes_none_later(tmp_path: Path) -> None:
 
 
 def test_every_scene_has_the_keys_that_are_set() -> None:
-    section = named("scale-estimation").section
+    section = find_experiment("scale-estimation").section
     assert section is not None
     scenes = {name: scene_from_options(f"builtin:{name}") for name in ("mug", "bowl")}
     found = with_assignments(scenes, section, ["contacts=4", "paper_networks=some folder"])
@@ -64,7 +64,7 @@ RESULTS: dict[RunCell, dict[str, Any]] = {
 
 def test_further_columns_are_means_of_the_rows_that_have_them() -> None:
     # By another name, since the registry's own table of scale estimation would be taken instead.
-    experiment = replace(named("scale-estimation"), name="two methods", measurement=TwoMethods)
+    experiment = replace(find_experiment("scale-estimation"), name="two methods", measurement=TwoMethods)
     by_method = {row.method: row for row in rows(experiment, RESULTS)}
     assert by_method["a"].means == {"f": 0.5}
     assert by_method["b"].means == {}

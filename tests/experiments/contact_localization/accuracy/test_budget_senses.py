@@ -113,10 +113,10 @@ def test_where_sound_promises_too_little_touch_is_tried_and_reads_the_images(run
 def test_settings_that_need_sound_are_left_out_where_nothing_was_heard(run: ContactRun) -> None:
     unheard = replace(run, observations=tuple(replace(one, strike=None) for one in run.observations))
     both = front(0.01, 1.0)
-    assert [point.levels for point in both.fitting(unheard.unfit).points] == [TOUCH]
-    assert both.fitting(run.unfit).points == both.points
+    assert [point.levels for point in both.fitting(unheard.explain_refusal).points] == [TOUCH]
+    assert both.fitting(run.explain_refusal).points == both.points
     with pytest.raises(WrongUse, match="contact-localization --sense touch"):
-        replace(both, points=both.points[1:]).fitting(unheard.unfit)
+        replace(both, points=both.points[1:]).fitting(unheard.explain_refusal)
 
 
 def test_sound_is_answered_the_same_whether_images_were_read_or_not(run: ContactRun) -> None:

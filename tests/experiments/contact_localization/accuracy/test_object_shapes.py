@@ -145,7 +145,7 @@ def test_a_budget_chooses_no_objectfile_where_the_scene_names_none() -> None:
         for name, levels in named.items()
     ]
     front = Front(tuple(points), 1.0, 6, (), "today", shipped=False)
-    unfit = partial(ContactMeasurement(EXPERIMENT).unfit, scene_of(None))
+    unfit = partial(ContactMeasurement(EXPERIMENT).explain_refusal, scene_of(None))
     assert [point.name for point in front.fitting(unfit).points] == ["solved"]
     with pytest.raises(WrongUse, match=r"ObjectFiles.*touchstone cost contact-localization"):
         replace(front, points=(points[1],)).fitting(unfit)
