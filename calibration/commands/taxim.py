@@ -274,7 +274,7 @@ def chosen(folder: Path | None, wanted: PressRequest) -> None:
 
 
 def perform_presses(wanted: PressRequest, as_json: bool) -> Path:
-    """Let the arm press, or go on with a run, and return its folder; ``RunStopped`` if Ctrl-C ended it."""
+    """Press with the arm, or resume a run, and return its folder; ``RunStopped`` if Ctrl-C ended it."""
     from calibration.taxim.arm.press import procedure
     from calibration.taxim.arm.record import NAME
     from harness.commands.run.watcher import TerminalWatcher

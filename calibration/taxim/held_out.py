@@ -1,14 +1,14 @@
-"""How well presses are predicted that a calibration has never seen: eight folds, press by press.
+"""Cross-validate a calibration on presses that were left out, in eight folds.
 
 ``_contact_circle`` finds the contact line of a ball in all presses at once. Laid over one another by their
-centres, the presses show one sharp line: along every ray from the centre the change of colour grows with the
-slope up to where the gel leaves the ball, and fades from there. A circle through those places says where the
-ball's axis is, whatever the lights do, and how large the contact is.
+centres, the presses show one sharp line: along every ray from the centre the colour change grows with the
+slope up to where the gel leaves the ball, and fades from there. A circle through those points gives the
+ball's axis, independently of the lights, and the radius of the contact.
 
 ``colour_misfit`` measures the error of the colours on presses that were left out. Every press is left out by
-one of the folds and compared with that fold's colours at its own refitted centre. What is left over has two
-parts. The camera's noise differs from pixel to pixel. The rest is alike from pixel to pixel, since the fit or
-the press is off as a whole, so that it adds up along a face. The covariance of pixels some way apart shows
+one of the folds and compared with that fold's colours at its own refitted centre. The residual has two
+parts. The camera's noise differs from pixel to pixel. The rest is correlated between pixels, since the fit or
+the press has an error as a whole, so that it adds up along a face. The covariance of distant pixels shows
 the second part alone.
 """
 
@@ -204,7 +204,7 @@ def _table_residual(
 
 
 def _contact_circle(change: FloatArray, centres: FloatArray, ball: float) -> ContactCircle:
-    """Fit the circle through the strongest change; its centres are off by one shift of all presses.
+    """Fit the circle through the strongest change, and one common shift of the centres of all presses.
 
     Raises:
         CalibrationRefused: the line is no smaller than the ball.

@@ -389,7 +389,7 @@ def _press(
 def _shaded_press(
     pack: PressPack, centre: FloatArray, light: GelLight, table: ShadowTable, pitch: float, ball: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Draw a press without its shadows, and what they take from it, grey levels each."""
+    """Render a press without its shadows, and the darkening by them, both in grey levels."""
     away = distance(pack.shape, centre)
     place = np.argwhere(away < REACH * light.edge)
     change = np.zeros((*pack.shape, 3))

@@ -81,7 +81,7 @@ def changes(pack: PressPack) -> FloatArray:
 
 
 def _ball_edge(change: FloatArray, centres: FloatArray, ball: float) -> float:
-    """Return the radius in pixels where the gel is steepest, mean over the presses; it is inside the ball."""
+    """Return the radius in pixels where the gel is steepest, averaged over the presses."""
     profile = [strength_by_radius(change[k], centres[k], ball) for k in range(len(change))]
     edge = float(np.argmax(np.median(profile, axis=0))) + 0.5
     if not 3.0 <= edge < ball:

@@ -112,7 +112,7 @@ def _bins_of_ball(right: FloatArray, down: FloatArray, ball: float) -> tuple[Int
 
 
 def _bin_terms(edge: float, ball: float) -> FloatArray:
-    """Return each bin's terms in the groups of the smooth model: 20 of slopes, and the offset."""
+    """Return the regressors of each bin: 20 of the smooth model's slopes, and the offset."""
     step = 0.5 * np.pi / (BINS - 1)
     magnitude, direction = np.meshgrid(
         (np.arange(BINS) + 0.5) * step, -np.pi + (np.arange(BINS) + 0.5) * 4.0 * step, indexing="ij"

@@ -321,8 +321,8 @@ _users = 0
 def _acquire() -> Any:
     """Return the ``sounddevice`` module with the present devices; ``release`` it after use.
 
-    PortAudio lists devices when it starts, and a microphone may have been plugged in since:
-    it is started again unless this process is using it.
+    PortAudio lists devices only when it starts, and a microphone may have been plugged in since.
+    It is restarted unless this process is using it.
     """
     global _users
     with _lock:

@@ -102,7 +102,7 @@ class Blocks:
 
 
 class Trigger:
-    """The first sample further than a threshold from the baseline, looked for block by block."""
+    """Search for the first sample further than a threshold from the baseline, block by block."""
 
     def __init__(self, blocks: Blocks, form: Format, start: int, baseline: float, threshold: int) -> None:
         self.index = start  #: number of the sample found; ``start`` until then.

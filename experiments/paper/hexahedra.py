@@ -25,7 +25,7 @@ from harness.basics.mesh import Mesh
 def is_within(
     rays: RayMesh, points: FloatArray, face_normals: FloatArray, random: np.random.Generator
 ) -> BoolArray:
-    """Mark which ``(n, 3)`` places in m a closed surface encloses: by where a random ray first meets it."""
+    """Mark which of ``(n, 3)`` points in m are inside a closed surface, by the first hit of a random ray."""
     directions = sphere(len(points), random)
     hits = rays.first_hits(points, directions)
     found = np.zeros(len(points), np.bool_)
@@ -70,10 +70,10 @@ def voxel_cubes(mesh: Mesh, cells: int = CELLS) -> tuple[IntArray, FloatArray, f
     """Find the cubes whose centres an object encloses.
 
     Returns:
-        ``(c, 3)`` their indices, ``(3,)`` m where index 0 begins, and m, a side.
+        ``(c, 3)`` indices of the cubes, ``(3,)`` m corner of index 0, and the side in m.
 
     Raises:
-        MeshRefused: a surface that encloses none.
+        MeshRefused: a surface that encloses no cube centre.
     """
     low, high = mesh.bounds
     side = float((high - low).max()) / cells
@@ -93,7 +93,7 @@ def hexahedral_modes(
     """Compute the ``most`` lowest modes up to ``limit`` Hz of an object made of cubes.
 
     Raises:
-        MeshRefused: a surface that holds no cube, or cubes without a mode below the limit.
+        MeshRefused: a surface that encloses no cube, or cubes without a mode below the limit.
     """
     cubes, origin, side = voxel_cubes(mesh, cells)
     corners = cubes[:, None] + _CORNERS

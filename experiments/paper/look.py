@@ -96,7 +96,7 @@ class ViewBench:
 
 
 def shown(image: LinearImage) -> ByteArray:
-    """Return ``(rows, columns, 3)`` before white, in sRGB."""
+    """Return the ``(rows, columns, 3)`` picture in sRGB on a white background."""
     return image.display(BEHIND)
 
 
@@ -104,7 +104,7 @@ def view_bench(of: ObjectFile, views: int, work: RenderingWork) -> ViewBench:
     """Render the views of an object and their reference.
 
     Raises:
-        DataRefused: its colours come from a file, which an ObjectFile does not hold.
+        DataRefused: its colours come from a file, which an ObjectFile does not contain.
     """
     work.report("vision: drawing the reference", 0.0)
     origins = [source.origin for source in of.description.provenance.sources]
@@ -223,12 +223,12 @@ def render_ball(
 
 
 def ball_of(mesh: Mesh) -> tuple[FloatArray, float]:
-    """Return the ``(3,)`` centre and the radius of the ball around an object's box, m."""
+    """Return the ``(3,)`` centre and the radius in m of the ball around an object's bounding box."""
     return mesh.bounds.mean(axis=0), 0.5 * mesh.diagonal
 
 
 def opened_field(data: bytes, mesh: Mesh, samples: int) -> UniformField:
-    """Open the network of a graph for pictures of an object."""
+    """Open the network of a graph to render an object."""
     inputs, outputs = osf_tensors(REACH)
     return UniformField(osf_field(Network(data, FIELD_FILE, inputs, outputs)), *ball_of(mesh), samples)
 
@@ -243,7 +243,7 @@ _SETTINGS: tuple[tuple[str, Column, RenderSettings], ...] = (
 
 
 def look_methods(bench: ViewBench, of: ObjectFile, work: RenderingWork) -> list[RenderingMethod]:
-    """Return every row of vision; the networks of the object are rows if it has some."""
+    """Return every method of vision; the object's own networks are included if it has some."""
     white = MadeMethod(lambda _: np.full((SIZE, SIZE, 3), 255, np.uint8))
     entry = of.description.vision
     own = (

@@ -90,7 +90,7 @@ def picture_scores(rendered: AnyArray, reference: AnyArray) -> dict[str, float]:
 
 
 def grid_places(least: float, shape: tuple[int, int]) -> FloatArray:
-    """``(rows * columns, 2)`` places of a grid, row by row, from ``least`` to 1 along each axis."""
+    """Return the ``(rows * columns, 2)`` points of a grid by rows, from ``least`` to 1 along each axis."""
     rows, columns = (np.linspace(least, 1.0, size) for size in shape)
     return np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1).reshape(-1, 2)
 
@@ -143,7 +143,7 @@ def train_network(
 ) -> tuple[bytes, float]:
     """Train a network by ``rendering_training.train_NAME``; see ``stored_graph``.
 
-    It must not learn from the queries of the bench; ``lesson`` is a digest of all that it learns from.
+    The queries of the bench must not be in its training data; ``lesson`` is a digest of that data.
     """
 
     def train() -> bytes:
@@ -158,7 +158,7 @@ def train_network(
 def stored_graph(
     store: Store, identity: tuple[object, ...], what: str, train: Callable[[], bytes], torch: bool = True
 ) -> tuple[bytes, float]:
-    """Take the graph of a network from the store, or train it and put it there.
+    """Load the graph of a network from the store, or train it and store it.
 
     ``identity`` holds all that the network depends on, ``what`` names it in messages, and ``torch`` states
     whether training needs it. The CPU seconds of the training are returned too.
@@ -207,8 +207,8 @@ def measure_sense(
 ) -> Iterator[MeasuredMethod]:
     """Measure every method of a sense, each cell stored as soon as it is measured; names must differ.
 
-    Quality is a cell a method. Seconds are one cell of all methods, which render in turn, so that what else
-    the machine does meets them alike.
+    Each method has a cell of quality. One cell has the seconds of all methods, which render in turn, so that
+    other load on the machine affects them equally.
     """
     worth: dict[str, Mapping[str, FloatArray]] = {}
     missing: dict[str, str] = {}
@@ -263,7 +263,7 @@ def _quality(
 
 
 def timed_in_turn(made: Mapping[str, MadeMethod], count: int, rounds: int = ROUNDS) -> dict[str, FloatArray]:
-    """Measure ``(k,)`` CPU s of each: in every round each renders one query, a slow one in fewer rounds."""
+    """Measure ``(k,)`` CPU seconds of each method; slow methods take part in fewer rounds."""
     taken: dict[str, list[float]] = {name: [] for name in made}
     for name, method in made.items():
         first = _seconds(method, 0)

@@ -149,7 +149,7 @@ def _measured(
 
 
 def row_of(name: str, queries: int, sense: Sense, found: MeasuredMethod) -> RenderingRow:
-    """Create the row of a measured method; without numbers if it could not be made."""
+    """Create the row of a measured method; without numbers if it could not be measured."""
     method = found.method
     seconds = None
     if len(found.seconds):
@@ -164,7 +164,7 @@ def row_of(name: str, queries: int, sense: Sense, found: MeasuredMethod) -> Rend
 
 
 def machine_text() -> str:
-    """Name the processor that seconds were taken on, and its number of cores."""
+    """Name the processor that seconds were measured on, and its number of cores."""
     known = machine()
     return f"{known['cpu']}, {known['cores']} virtual cores, one thread"
 

@@ -57,7 +57,7 @@ _RIDGE = 1e-6
 
 
 def encoded_width(inputs: int, octaves: int) -> int:
-    """Return how many numbers so many inputs are encoded as."""
+    """Return the number of encoded values for a number of inputs."""
     return inputs * (1 + 2 * octaves)
 
 
@@ -114,12 +114,12 @@ def train_graph(
     Args:
         spec: the network and its training.
         pair: its input and its output tensor.
-        doc: description stored in the graph.
-        draw: samples the rows of a step.
+        doc: description that the graph stores.
+        draw: function that samples the rows of a step.
         seed: random seed of the first weights and of the rows.
-        report: takes the fraction of the steps that is done.
+        report: function of the completed fraction of the steps.
         scale: factor of the trained outputs.
-        solve: whether to solve the last layer, or leave it as it is trained.
+        solve: whether to solve the last layer or leave it as trained.
     """
     torch.set_num_threads(1)
     inputs, outputs = (int(tensor.shape[1]) for tensor in pair)
@@ -237,7 +237,7 @@ class OsfField(nn.Module):
         return self.colour(hidden), both[:, -1]
 
     def hidden(self, points: FloatArray) -> Tensor:
-        """``(n, width + 1)``: what the colour is computed from, and the logits of places."""
+        """Return ``(n, width + 1)``: the inputs of the colour, and the logits of the density at points."""
         hidden = encode(points, self._octaves)
         for layer in self.trunk[:-1]:
             hidden = torch.relu(layer(hidden))
@@ -257,7 +257,7 @@ class OsfField(nn.Module):
 
 
 def train_field(bench: ViewBench, spec: FieldSpec, report: Report) -> bytes:
-    """Train 1.0's network of the look, in the frame of the ball; places are clear of the bench's views."""
+    """Train 1.0's network of vision in the frame of the ball, on points away from the bench's views."""
     torch.set_num_threads(1)
     mesh = bench.lit.appearance.mesh
     middle, radius = ball_of(mesh)

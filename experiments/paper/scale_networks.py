@@ -69,7 +69,7 @@ def crop_of(picture: ByteArray, mask: BoolArray, focal_px: float) -> FloatArray:
     """Cut the object out of an RGB picture, with a black background; the camera's pose is not used.
 
     Returns:
-        ``(3, SIDE, SIDE)``, 0 black to 1 white, times the share of a pixel that the object covers.
+        ``(3, SIDE, SIDE)``, 0 black to 1 white, times the fraction of the pixel that the object covers.
 
     Raises:
         FitRefused: the mask is empty.
@@ -152,10 +152,10 @@ class PaperNetwork:
     network: Network  #: that runs it.
 
     def size(self, views: Sequence[Mapping[str, FloatArray]]) -> float:
-        """Compute the geometric mean, in m, of the sizes by the inputs of one or more readings of one object.
+        """Compute the geometric mean in m of the sizes from one or more readings of one object.
 
         Raises:
-            DataRefused: inputs of another form, or an answer that is no size.
+            DataRefused: inputs of another shape, or an output that is no size.
         """
         stacked = {
             tensor.name: np.stack([view[tensor.name] for view in views]).astype(np.float32)
@@ -175,8 +175,8 @@ def paper_networks(folder: Path) -> dict[str, PaperNetwork]:
     """Open the paper's networks of a folder, by sense.
 
     Raises:
-        DataRefused: there is none, a card is missing or no JSON, or a graph must not be run or is not of its
-            sense.
+        DataRefused: there is no network, a card is missing or not JSON, or a graph is not allowed or is of
+            another sense.
     """
     size = Tensor(name="log_size", dtype="float32", shape=("n", 1), unit="1", meaning="log of the size in m")
     found = {}

@@ -122,7 +122,7 @@ def _crop(lit: LitObject, mesh: Mesh, size: float, random: np.random.Generator) 
 def crop_camera(
     mesh: Mesh, size: float, base_from_object: FloatArray, base_from_camera: FloatArray
 ) -> Pinhole:
-    """Return a camera of the bench, cut to a crop about the object, in the frame of its shape, one long."""
+    """Return a camera of the bench, cropped to the object, in the frame of its shape of unit length."""
     object_from_camera = inverse(base_from_object) @ base_from_camera
     object_from_camera[:3, 3] /= size
     corners = apply(inverse(object_from_camera), mesh.vertices)

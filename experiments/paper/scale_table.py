@@ -197,12 +197,12 @@ def random_error(sizes: SizeRange, true: float) -> float:
 
 
 def constant(sizes: SizeRange) -> float:
-    """Return the geometric mean of the range, m."""
+    """Return the geometric mean of the range in m."""
     return float(np.sqrt(sizes.low * sizes.high))
 
 
 def by_first_peak(peaks: Peaks, model: RingingModel, nominal: float) -> float:
-    """Return the size in m if the lowest peak were the lowest mode."""
+    """Return the size in m at which the lowest mode has the frequency of the lowest peak."""
     return float(nominal * model.frequencies[0] / peaks.frequencies[0])
 
 
@@ -249,7 +249,7 @@ class PaperReadings:
     patches: Sequence[Patch]  #: of the contacts that met the object, in their order.
 
     def views(self, sense: str) -> list[dict[str, FloatArray]]:
-        """Compute the inputs of a sense's network, one or more.
+        """Compute one or more inputs of a sense's network.
 
         Raises:
             FitRefused: the run has no reading of the sense.
@@ -296,10 +296,10 @@ class ScaleTable(ScaleMeasurement):
     def run_cell(
         self, cell: RunCell, scene: SceneFile, station: Station, recordings: Path | None = None
     ) -> dict[str, Any]:
-        """Perform a run, or take it from ``recordings``, and answer it by every method.
+        """Perform a run, or open it in ``recordings``, and answer it by every method.
 
         Raises:
-            DataRefused: nothing was read, or ``[scale] paper_networks`` has no network that may be run.
+            DataRefused: the run has no readings, or ``[scale] paper_networks`` has no usable network.
         """
         stated = scene.section(Scale).paper_networks
         networks = {} if stated is None else paper_networks(Path(stated))
@@ -317,7 +317,7 @@ class ScaleTable(ScaleMeasurement):
                 pictures = look_pictures(record) or pictures
             true = float(truth.differences["longest_side_m"])
             rows = _rows(answering, answering.answer(), true)
-            # The sizes that the paper's networks compute from the same readings.
+            # Sizes by the paper's networks from the same readings.
             camera = answering.model.station.camera
             focal_px = 0.0 if camera is None else camera.focal_length
             readings = PaperReadings(pictures, focal_px, answering.strikes, answering.patches)

@@ -236,11 +236,11 @@ class ShapeTable(ShapeMeasurement):
     def run_cell(
         self, cell: RunCell, scene: SceneFile, station: Station, recordings: Path | None = None
     ) -> dict[str, Any]:
-        """Perform a run, or take it from ``recordings``, and answer it by every method.
+        """Perform a run, or open it in ``recordings``, and answer it by every method.
 
         Raises:
             DataRefused: the true surface is unknown, or ``[shape] pcn`` has no network that may be run.
-            WrongUse: ``[shape] library`` is no folder, or holds no shape that can be used.
+            WrongUse: ``[shape] library`` is no folder, or contains no usable shape.
         """
         asked = scene.section(ShapeRun)
         networks = [] if asked.pcn is None else paper_completions(Path(asked.pcn))

@@ -113,7 +113,7 @@ class StrikeBench:
 def summed(
     frequencies: FloatArray, rates: FloatArray, gains: AnyArray, level: SynthesisLevel = "fast"
 ) -> FloatArray:
-    """Synthesize the ``(t,)`` sound of ``(m,)`` gains, as long and at the rate of the distances."""
+    """Synthesize the ``(t,)`` sound of ``(m,)`` gains, with the length and the rate of the distances."""
     return synthesize(frequencies, rates, np.asarray(gains)[None], DURATION, RATE, level).sound[0]
 
 
@@ -121,7 +121,7 @@ def strike_bench(mesh: Mesh, material: Material, strikes: int, work: RenderingWo
     """Choose the strikes of an object; its modes are solved once.
 
     Raises:
-        MeshRefused: a surface that cannot be filled or solved, or without a mode in hearing.
+        MeshRefused: a surface that cannot be filled or solved, or without an audible mode.
     """
     work.report("audio: solving the reference's elements", 0.0)
     edge = default_edge(mesh, material, HEARING, MODES)
@@ -207,7 +207,7 @@ _PROFILES: tuple[tuple[str, Column], ...] = (
 
 
 def sound_methods(bench: StrikeBench, work: RenderingWork) -> list[RenderingMethod]:
-    """Return every row of sound."""
+    """Return every method of sound."""
     silence = np.zeros(round(DURATION * RATE))
     ours = [
         RenderingMethod(
@@ -325,9 +325,9 @@ _QUADRATIC_PARTS = 4
 
 
 def between_nodes(modes: Modes, allowed: BoolArray, each: int, seed: int) -> SoundSamples:
-    """Sample places between nodes, as many in each face, with the shapes that the elements give there.
+    """Sample points between nodes, equally many in each face, with the interpolated mode shapes.
 
-    Quadratic in each face of a ten-node cell where ``modes`` lists them as ``harness.sim.modal.modal`` does,
+    The interpolation is quadratic in each face of a ten-node cell if ``modes`` lists the middle nodes,
     else linear in each triangle. Places and shapes of the curved face belong together. Faces with a node that
     is not among the ``(n,)`` allowed ones give nothing.
     """

@@ -131,7 +131,7 @@ class TouchBench:
 def touch_bench(
     mesh: Mesh, presses: int, kind: Kind, work: RenderingWork, codes: NodeSearch | None = None
 ) -> TouchBench:
-    """Sample presses of an object; those that are impossible or that its codes refuse are left out.
+    """Sample presses of an object, without those that are impossible or outside the domain of its codes.
 
     Raises:
         OutOfDomain: no press is possible.
@@ -266,7 +266,7 @@ def untouched(bench: TouchBench, suffix: str = "") -> RenderingMethod:
 
 
 def touch_methods(bench: TouchBench, of: ObjectFile, work: RenderingWork) -> list[RenderingMethod]:
-    """Return every row of touch; the codes of the object are a row if it has some."""
+    """Return every method of touch; the object's own codes are included if it has some."""
     largest = TOUCH_PROFILES["standard"].codes
     own, entry = [], of.description.touch
     if entry is not None and entry.codes is not None:

@@ -1,4 +1,4 @@
-"""The runs that measure scale estimation: objects, gaps, looks, and whether the shape is known."""
+"""The runs that measure scale estimation."""
 
 from dataclasses import dataclass
 

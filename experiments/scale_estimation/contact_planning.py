@@ -267,9 +267,9 @@ def seen_envelope(model: ObjectModel, stands: Sequence[SeenStand]) -> Mesh:
 
 
 def _envelope(model: ObjectModel, stands: Sequence[FloatArray], off: float, margin: float) -> Mesh:
-    """Return the convex space, in base, of an object at any of some poses, ``off`` m around each.
+    """Return the convex hull in the base frame of an object at some poses, with a margin of ``off`` m.
 
-    A stand is ``(4,)``: log of the size over the nominal one, x, y, m, yaw, rad; nothing is below z = 0.
+    A pose is ``(4,)``: log of the relative size, x and y in m, yaw in rad; the hull is cut at z = 0.
     """
     corners = model.corners
     places = hull_of(np.concatenate([placed(model, corners, stand) for stand in stands]))

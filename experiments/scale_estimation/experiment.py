@@ -41,7 +41,7 @@ class ScaleMeasurement(Measurement):
         scenes: Mapping[str, SceneFile],
         counts: Sequence[int],
     ) -> list[tuple[int, Setting]]:
-        """List the answers of a run: every level of the knob if a shape is known, its default if none is."""
+        """List the answers of a run; only for known shapes every level of the knob."""
         answers = super().list_answers(thorough, chosen, scenes, counts)
         return [one for one in answers if "known" in chosen["shape"] or one[1][STARTS.name] == STARTS.default]
 

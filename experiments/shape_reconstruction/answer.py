@@ -30,7 +30,7 @@ HOUSING_DEPTH = 0.12
 
 @dataclass(eq=False)
 class ShapeReadings:
-    """What the steps read so far say; each step is read once."""
+    """The readings of a run's steps so far; each step is read once."""
 
     run: RunFiles
     touches: list[GuardedTouch] = field(default_factory=list, init=False)
@@ -171,7 +171,7 @@ def base_from_stand(run: RunFiles) -> FloatArray:
 
 
 def _guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
-    """Read one way of the gel."""
+    """Read the contacts of one probe line."""
     settings, seen = run.scene.section(ShapeRun), run.observe(record)
     read = run.gel_reader.read(seen.images)
     read.require_accepted()
@@ -197,7 +197,7 @@ def _guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
 
 
 def _seen_mask(run: RunFiles, mask: BoolArray) -> SeenMask | None:
-    """Return the silhouette as evidence; None if the camera did not see the object."""
+    """Return the silhouette as evidence; None if the object is not in the camera image."""
     camera, settings = run.station.camera, run.scene.section(ShapeRun)
     assert camera is not None  # there are its pictures
     if mask.sum() < limits.MIN_PIXELS:

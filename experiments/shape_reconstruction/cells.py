@@ -38,7 +38,7 @@ class ShapeCell(RunCell):
     def create_scene(self, scene: SceneFile) -> SceneFile:
         """Create the scene of the run, with camera and gel.
 
-        It has as many presses as its table ``[shape]`` states, ``PRESSES[-1]`` without one.
+        The number of presses is that of its table ``[shape]``, or ``PRESSES[-1]`` without one.
         """
         tree = scene.model_dump(mode="json", by_alias=True)
         tree["sensors"].update(camera=True, sound=False, touch=True)

@@ -1,6 +1,6 @@
 """Reconstruct a shape from contacts, silhouette and the single-view prior.
 
-Each candidate predicts the contacts that were left out of its fit, and the outline in the picture. The family
+Each candidate predicts the contacts that were left out of its fit, and the outline in the image. The family
 is assumed until enough contacts at different places agree with it.
 """
 
@@ -248,7 +248,7 @@ def choose(fit: FamilyFit | None, smooth: SmoothSurface | None, prior: ShapeEsti
 
 
 def _rejection_reason(fit: FamilyFit, smooth: SmoothSurface | None) -> str | None:
-    """State why the family is not the answer; None where it is."""
+    """State why the shape family is rejected; None if it is not."""
     count = len(fit.left_out)
     if fit.nuisance.is_excessive:
         return "no household shape fits the readings on a bench as this is calibrated"
@@ -301,7 +301,7 @@ def rank(fit: FamilyFit) -> tuple[bool, float]:
 
 
 def _needs_search(best: FamilyFit, made: int) -> bool:
-    """Decide on one more search: for a poor fit, several classes that fit alike, or no picture."""
+    """Decide on one more search: for a poor fit, several classes of similar fit, or no image."""
     many = len(best.left_out) >= limits.MIN_CONTACTS
     least = 1 if best.sighted or not many else limits.MIN_BLIND_SEARCHES
     rivals = sum(weight >= limits.MIN_RIVAL_WEIGHT for weight in best.mixture.by_class().values())

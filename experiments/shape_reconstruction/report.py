@@ -1,4 +1,4 @@
-"""The report of a shape reconstruction: the surface, the readings that it is made from, and the truth."""
+"""The report of a shape reconstruction: the surface, its readings, and the truth."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -142,7 +142,7 @@ def _counted(count: int, noun: str) -> str:
 
 
 def _shown(estimate: ShapeEstimate, evidence: ShapeEvidence) -> KnownSurface:
-    """Return a surface with the readings that it is made from."""
+    """Return a picture of a surface with its readings."""
     touches = evidence.touches
     contacts = np.array([touch.points.mean(axis=0) for touch in touches if touch.met]).reshape(-1, 3)
     passed = []

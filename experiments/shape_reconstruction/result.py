@@ -39,7 +39,7 @@ def true_surface(run: RunFiles, truth: Truth | None) -> Mesh | None:
 
 
 def result_of(scored: ScoredShape) -> dict[str, Any]:
-    """Create the answer as JSON values; write the surfaces that it names into the folder of the result."""
+    """Return the answer as JSON values; write its surfaces into the folder of the result."""
     answer: ShapeAnswer = scored.found
     truth = true_surface(scored.run, scored.truth)
     estimates = {}

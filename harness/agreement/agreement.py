@@ -150,9 +150,9 @@ class Agreement:
 
 
 def judged(about: str, senses: Sequence[SenseResiduals], false_alarm: float = FALSE_ALARM) -> Agreement:
-    """Judge the residuals of each sense, which are chi-squares where the model is right.
+    """Test the residuals of each sense, which have chi-square distributions if the model is right.
 
-    The senses that are compared share ``false_alarm`` evenly, and so do the residuals of each (Bonferroni).
+    ``false_alarm`` is divided evenly among the senses, and again among the residuals of each (Bonferroni).
 
     Raises:
         OutOfDomain: a rate that is not between 0 and 1.

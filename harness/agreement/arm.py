@@ -88,8 +88,8 @@ def compare_arm(
     """Compare a controller's flange poses with the twin's for the same joints.
 
     Args:
-        model: model of the arm.
-        joints: ``(n, 6)`` rad, recorded.
+        model: kinematic model of the arm.
+        joints: ``(n, 6)`` rad, recorded joint angles.
         base_from_flange: ``(n, 4, 4)`` poses recorded with the joints.
 
     Returns:

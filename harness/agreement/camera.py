@@ -42,7 +42,7 @@ class OutlineNoise:
 
 
 def compare_camera(subject: Subject) -> SenseResiduals:
-    """Compare the outline in every picture of the scene camera with the model's."""
+    """Compare the object's outline in every image of the scene camera with the model's."""
     run, residuals, notes = subject.run, list[Residual](), list[str]()
     none = SenseResiduals("camera", "reference", (), "no picture by the scene camera was recorded")
     if run.station.camera is None:
@@ -79,10 +79,10 @@ def _residuals(view: "OutlineView", step: int, mask: BoolArray, errors: BenchErr
 def outline_residuals(
     step: int, view: "OutlineView", seen: SeenOutline, errors: BenchErrors, noise: OutlineNoise
 ) -> tuple[Residual, ...]:
-    """Compare place and shape of an outline with the model's; hidden directions do not count.
+    """Compare position and shape of an outline with the model's, without the hidden directions.
 
     Raises:
-        DataRefused: the outline is hidden in every direction, or the model stands behind the camera.
+        DataRefused: the outline is hidden in every direction, or the model is behind the camera.
     """
     free = ~seen.hidden
     if not free.any():

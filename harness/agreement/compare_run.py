@@ -32,17 +32,17 @@ P = ParamSpec("P")
 def agreement_of(
     run: RunFiles, subject: Subject | None = None, reference: bool = False, measured: str = ""
 ) -> Agreement:
-    """Compare a recording with an object at the place that its scene states.
+    """Compare a recording with an object at the pose that its scene states.
 
     Args:
         run: recording of any experiment.
-        subject: the object; None for the run's own.
-        reference: whether the reference simulation is compared too where a network stands for it.
-        measured: what the run itself measures of its object, so that its scene does not state it, in a
-            sentence; empty where the scene, or who gives the subject, states all.
+        subject: object to compare with; None for the run's own.
+        reference: whether the reference simulation is compared too if a network replaces it.
+        measured: sentence on the quantities that the run measures and its scene does not state; empty if
+            scene or subject state all.
 
     Raises:
-        RecordingDamaged: the recording, or what it carries, cannot be read.
+        RecordingDamaged: the recording or a file in it cannot be read.
     """
     subject = subject or own_subject(run)
     name = subject.scene.object.name

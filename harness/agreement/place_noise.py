@@ -19,17 +19,17 @@ POSITION = 0.5e-3
 
 
 def own_covariance(errors: BenchErrors) -> FloatArray:
-    """``(6, 6)``: covariance of the twist that each contact has of its own."""
+    """Compute the ``(6, 6)`` covariance of the twists that differ between contacts."""
     return np.diag(np.repeat([errors.arm**2, errors.arm_tilt**2], 3))
 
 
 def shared_twists(errors: BenchErrors, base_from_gel: FloatArray, anchor: FloatArray) -> FloatArray:
-    """``(6, 13)``: the twist of a gel for one sigma of each shared error, to first order.
+    """Compute the ``(6, 13)`` twists of a gel for one sigma of each shared error, to first order.
 
     Args:
-        errors: the sigmas.
-        base_from_gel: ``(4, 4)``, at the contact.
-        anchor: ``(3,)`` m in base, about which the object may be turned and larger.
+        errors: standard deviations of the errors.
+        base_from_gel: ``(4, 4)`` pose of the gel at the contact.
+        anchor: ``(3,)`` m in the base frame, fixed point of the object's rotation and scaling.
     """
     rotation, arm = base_from_gel[:3, :3], base_from_gel[:3, 3] - anchor
     turns = np.array([errors.tilt, errors.tilt, errors.yaw])

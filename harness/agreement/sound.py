@@ -112,7 +112,7 @@ class PhaseNoise:
 
 
 def compare_sound(subject: Subject, source: Source, contacts: Sequence[PressedContact]) -> SenseResiduals:
-    """Compare the resonances of a run with a model's modes, and how its strikes share them."""
+    """Compare the resonances of a run, and their amplitudes in each strike, with a model's modes."""
     struck = [contact for contact in contacts if contact.seen.strike is not None]
     if not struck:
         return SenseResiduals("sound", source, (), "no contact was struck")
@@ -155,7 +155,7 @@ class StruckModes:
 def struck_modes(
     subject: Subject, struck: Sequence[PressedContact], modes: Modes, factor: float, error: float
 ) -> StruckModes:
-    """Evaluate a model's modes at the places that were struck, along the gel's axis; see ``StruckModes``."""
+    """Evaluate a model's modes at the struck points, along the gel's axis; see ``StruckModes``."""
     poses = inverse(subject.base_from_object) @ np.array([one.seen.base_from_gel for one in struck])
     axes, depths = poses[:, :3, 2], np.array([max(0.0, float(one.heights.max())) for one in struck])
     # Unit to the last digit, whatever the controller's quaternions are.
@@ -167,7 +167,7 @@ def struck_modes(
 
 
 def resonance_residual(step: int, peaks: FloatArray, modes: FloatArray, noise: ResonanceNoise) -> Residual:
-    """Test how many of ``(P,)`` peaks, one or more, ``(m,)`` ascending modes explain, as ``-2 ln p``; Hz."""
+    """Test how many of ``(P,)`` peaks the ``(m,)`` ascending modes explain, both in Hz, as ``-2 ln p``."""
     found = matched(peaks, modes, noise)
     unexplained = int(np.count_nonzero(~found.explained))
     probability = float(binom.sf(unexplained - 1, len(peaks), noise.clutter))
@@ -199,7 +199,7 @@ def matched(peaks: FloatArray, modes: FloatArray, noise: ResonanceNoise) -> Reso
 def microphone_residual(
     step: int, peaks: Sequence[Peak], modes: StruckModes, shares: ShareNoise, phases: PhaseNoise
 ) -> Residual | None:
-    """Test the strikes' shares for a microphone at rest; None where no peak has any to compare.
+    """Test that the strikes' amplitudes fit a microphone at rest; None if no peak has comparable ones.
 
     Each peak has a score of its phases and one of its gains, normal where the model is right, and so is their
     sum over its own sigma (Stouffer). The residual is its ``-2 ln p``, a chi-square of two degrees.
@@ -277,7 +277,7 @@ def _off(peak: Peak, modes: StruckModes, group: slice, noise: ShareNoise) -> flo
 
 
 def phase_score(peak: Peak, modes: FloatArray, noise: PhaseNoise) -> float | None:
-    """Return how far strikes are out of phase at a peak, in sigmas above the median.
+    """Compute the phase error of strikes at a peak, in sigmas above the median.
 
     Modes are ``(m,)`` Hz of the model times the common factor; None where the peak has no single mode.
     """
@@ -294,7 +294,7 @@ def phase_score(peak: Peak, modes: FloatArray, noise: PhaseNoise) -> float | Non
 
 
 def skirts_at(peak: Peak, modes: FloatArray) -> FloatArray:
-    """``(m,)``: the energy of each mode's skirt at a peak over its own, were it as broad and as loud."""
+    """Compute the ``(m,)`` energy of each mode's tail at a peak, relative to an equally broad and loud mode there."""
     apart = np.maximum(np.abs(np.log(modes / peak.frequency)), _NEXT)
     return np.asarray((half_width(peak) / apart) ** 2)
 

@@ -108,16 +108,16 @@ def _of_object(chosen: Plan, given: Quantities) -> tuple[str, ...]:
 
 
 def own_subject(run: RunFiles, levels: Mapping[str, Level] | None = None) -> Subject:
-    """Return the object of a run's scene, with the ObjectFile that the run may carry; see ``Subject``."""
+    """Return the object of a run's scene, with the run's ObjectFile if it has one; see ``Subject``."""
     of = run.objectfile if run.carries_objectfile else None
     return Subject(run, run.scene, run.mesh, MATERIALS[run.scene.object.material], of, levels or {})
 
 
 def subject_of_file(run: RunFiles, folder: Path) -> Subject:
-    """Put an ObjectFile in the place of a run's object.
+    """Return the object of an ObjectFile at the pose of a run's object.
 
     Raises:
-        WrongUse: there is none.
+        WrongUse: there is no such ObjectFile.
         DataRefused: it is damaged.
     """
     of = ObjectFile.open(folder)

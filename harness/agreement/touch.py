@@ -1,15 +1,15 @@
-"""Touch: the gel's surface, as its picture shows it and as a model of the object gives it.
+"""Compare the gel's surface in tactile images with the surface predicted by a model of the object.
 
 The gel's pose is known to a few tenths of a millimetre and a degree, which moves most of a picture: it is
-found anew at each contact, and what it is off by counts beside what the surface is off by.
-A network is wrong altogether at some places, so that no single contact speaks against an object; how many do
+estimated at each contact, and its error is added to the error of the surface.
+A network fails at some points, so that no single contact rejects an object; the number of contacts that do
 not fit is binomial where the object is right.
 
-``PoseSearch`` finds the pose of the gel at which a contact's picture and a model of the object agree best.
-Eight numbers of a contact are known to a stated sigma only: six of the gel's pose, the gain by which its
-picture shows heights, and how far it hangs from what it touches. They are found between the reading and their
-prior (Gauss-Newton, slopes by differences). For errors that are normal, what is left at the best of them,
-with what they are off by, is a chi-square of as many degrees as there are independent readings.
+``PoseSearch`` finds the pose of the gel at which a contact's image and a model of the object agree best.
+Eight numbers of a contact have a prior with a stated sigma: six of the gel's pose, the gain by which its
+image shows heights, and the width of the contact border. They are fitted to the reading and their
+prior (Gauss-Newton with numerical derivatives). For normal errors, the cost at the best fit,
+prior included, has a chi-square distribution with as many degrees as there are independent readings.
 """
 
 from collections.abc import Callable, Sequence
@@ -124,7 +124,7 @@ class Surfaces:
 
 
 def surface_residual(step: int, found: Surfaces, noise: SurfaceNoise, gross: float = 0.0) -> Residual:
-    """Compare a contact's surfaces; ``gross`` is the probability that the model's is none of the object's."""
+    """Compare a contact's surfaces; ``gross`` is the probability that the model's surface is an outlier."""
     gaps = (found.read - found.modelled)[found.compared]
     area = len(gaps) * found.pitch**2
     # So many patches of the contact are off independently of each other.
@@ -146,9 +146,9 @@ def surface_residual(step: int, found: Surfaces, noise: SurfaceNoise, gross: flo
 
 
 def mixed(chi_squares: FloatArray, dof: float, gross: float = 0.0) -> float:
-    """Combine ``(s,)`` chi-squares of equally probable noises to the one that is as improbable as their mean.
+    """Combine ``(s,)`` chi-squares of equally probable noises into one with their mean p-value.
 
-    ``gross`` is the probability of any value, however large.
+    ``gross`` is the probability of an outlier of any size.
     """
     if len(chi_squares) == 1 and gross == 0.0:
         return float(chi_squares[0])
@@ -157,7 +157,7 @@ def mixed(chi_squares: FloatArray, dof: float, gross: float = 0.0) -> float:
 
 
 def counted_residual(residuals: Sequence[Residual], gross: float) -> Residual:
-    """Test how many contacts, of one or more, do not fit, as ``-2 ln p``; ``gross`` as above."""
+    """Test the number of contacts that do not fit, as ``-2 ln p``; ``gross`` as in ``mixed``."""
     share = gross + (1.0 - gross) * _IMPROBABLE
     found = chi2.sf([one.chi_square for one in residuals], [one.dof for one in residuals])
     unlike = int(np.count_nonzero(found < share))
@@ -173,7 +173,7 @@ def counted_residual(residuals: Sequence[Residual], gross: float) -> Residual:
 
 
 class PoseSearch:
-    """A search for one contact's likeliest pose, gain and skirt, each over its sigma: ``(8,)``."""
+    """A search for the most probable pose, gain and border of one contact, ``(8,)`` in units of sigma."""
 
     def __init__(
         self,
@@ -198,12 +198,12 @@ class PoseSearch:
         self._root = np.linalg.cholesky(twist_covariance(errors, self._pose, anchor))
 
     def best(self) -> Surfaces:
-        """Find the pose between reading and prior that fits best, and both surfaces there.
+        """Find the pose that fits reading and prior best, and both surfaces there.
 
-        Other starts are tried where the first search fits badly.
+        Other starts are tried if the first search has a poor fit.
 
         Raises:
-            OutOfDomain: no network was made for the stated pose, or for those at which it would fit.
+            OutOfDomain: the stated pose, or every pose that would fit, is outside the network's domain.
             WrongUse: the network is of another gel or object.
         """
         found: list[tuple[float, FloatArray, FloatArray]] = []

@@ -1,4 +1,4 @@
-"""Measurement of contact localization: its runs, a table's rows by every method, cost curves and budgets."""
+"""Measure contact localization for tables, cost curves and budgets."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -119,7 +119,7 @@ class ContactMeasurement(Measurement):
     def cells(
         self, objects: Sequence[str], seeds: Sequence[int], chosen: Mapping[str, Sequence[str]]
     ) -> list[RunCell]:
-        """List the runs, one seed of every object before the next; all are struck if any sense needs it."""
+        """List the runs, seed by seed; every contact is struck if a sense needs it."""
         varied = product(chosen["yaw"], chosen["gap"], chosen["spacing"], chosen["choose"], objects)
         sound = "both" in chosen["sense"]
         first = [
@@ -128,7 +128,7 @@ class ContactMeasurement(Measurement):
         return [replace(cell, seed=seed) for seed in seeds for cell in first]
 
     def solver(self, files: RunFiles, cell: RunCell | None = None) -> ContactRun:
-        """Return a run's contacts; those of a table or a cost curve share the models of their object."""
+        """Return a run's contacts; runs of a table or a cost curve share the models of their object."""
         run = run_of(files)
         if cell is None:
             return run
@@ -145,7 +145,7 @@ class ContactMeasurement(Measurement):
     def run_cell(
         self, cell: RunCell, scene: SceneFile, station: Station, recordings: Path | None = None
     ) -> dict[str, Any]:
-        """Perform a run, or take it from ``recordings``, and answer it by every method.
+        """Perform a run, or open it in ``recordings``, and answer it by every method.
 
         Raises:
             DataRefused: the true contacts are unknown.
@@ -169,7 +169,7 @@ class ContactMeasurement(Measurement):
         scenes: Mapping[str, SceneFile],
         counts: Sequence[int],
     ) -> list[tuple[int, Setting]]:
-        """List the answers of a run: every setting from all contacts, and a few from fewer contacts."""
+        """List the answers of a run: every setting from all contacts, some from fewer contacts."""
         sound = "both" in chosen["sense"]
         named = [scene for scene in scenes.values() if scene.object.objectfile is not None]
         networks = [networks_of(named_file(scene).description) for scene in named]
@@ -182,7 +182,7 @@ class ContactMeasurement(Measurement):
         return setting_name(setting)
 
     def notes(self) -> tuple[str, ...]:
-        """Return what the modes cost per object, in a sentence for each choice of their knobs."""
+        """State the seconds of the modes per object, in a sentence for each choice of their knobs."""
         seconds: dict[str, list[float]] = {}
         for own in self.models.values():
             for levels, model in own.all().items():
@@ -202,23 +202,23 @@ class ContactMeasurement(Measurement):
             return load(Path(path))
 
     def condition(self, scene: SceneFile) -> Mapping[str, Level]:
-        """Return the condition of a scene's runs as a curve has it, without the number of contacts."""
+        """Return the condition of a scene's runs in a curve, without the number of contacts."""
         section = scene.section(Localization)
         # A real bench has a gap, and a mocked one without a gap is only easier.
         return {"spacing": section.spacing, "gap": "default", "yaw": section.yaw}
 
     def explain_refusal(self, scene: SceneFile, setting: Setting) -> str | None:
-        """Return why a scene's runs cannot be answered at a setting; None if they can."""
+        """State why a scene's runs cannot be answered at a setting; None if they can."""
         if needs_sound(setting) and not scene.sensors.sound:
             return SILENT
         networks = any(setting.get(knob.name, knob.default) != knob.default for knob in (SHAPES, TOUCH))
         return _NO_OBJECTFILE if networks and scene.object.objectfile is None else None
 
     def is_offered(self, setting: Setting) -> bool:
-        """Return whether modes are of the default elements.
+"""State whether a setting has the default elements of modes.
 
-        Coarser elements are measured for what they cost in accuracy; they are quicker once per object. Of
-        settings with equal errors one of them would be chosen by chance.
+        Coarser elements are measured for their loss of accuracy; they save time once per object. Of
+        settings with equal errors, a budget would select one by chance.
         """
         return setting.get(EDGE.name, EDGE.default) == EDGE.default
 

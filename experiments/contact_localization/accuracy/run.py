@@ -1,4 +1,4 @@
-"""A localization's readings in memory, to be answered at any setting."""
+"""The readings of a localization in memory, which are answered at any setting."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ SILENT = (
 
 @dataclass(frozen=True, eq=False)
 class ContactRun:
-    """A run as a ``Solver``."""
+    """A recorded run of contact localization as a ``Solver``."""
 
     observations: tuple[Observation, ...]  #: the contacts.
     reader: GelReader  #: reader of their pictures.
@@ -55,7 +55,7 @@ class ContactRun:
         return replace(self, observations=self.observations[:steps])
 
     def explain_refusal(self, setting: Setting) -> str | None:
-        """Return why a setting cannot be answered: it needs sound and no contact was struck."""
+        """State why a setting cannot be answered: it needs sound and no contact was struck."""
         struck = any(observation.strike is not None for observation in self.observations)
         return SILENT if needs_sound(setting) and not struck else None
 
@@ -64,7 +64,7 @@ class ContactRun:
         prepare(self.models.at(setting), setting)
 
     def shares_preparation(self, one: Setting, other: Setting) -> bool:
-        """Return whether samples and modes are the same, as far as ``one`` needs them."""
+        """State whether the two settings have the same samples and modes, as far as ``one`` needs them."""
         varied = SIMULATED if needs_sound(one) else (TOUCH,)
         simulated = all(one.get(knob.name) == other.get(knob.name) for knob in varied)
         return simulated and one[SPACING.name] == other[SPACING.name]
@@ -78,7 +78,7 @@ class ContactRun:
         return tuple(self.reader.read(each.images) for each in self.observations)
 
     def readings(self, setting: Setting) -> Readings:
-        """Return the readings as a setting uses them, compared with the object as it models that."""
+        """Return the readings that a setting uses, with its model of the object."""
         gels = self._gels if needs_images(setting) else ()
         return Readings(self.observations, gels, self.models.at(setting), self.prior, self.seed)
 

@@ -1,8 +1,8 @@
-"""Which point of the object was touched: from tactile images and relative arm poses alone.
+"""Locate the contact on the object from tactile images and relative arm poses alone.
 
-Particles start uniformly over the surface. At each contact they are weighed by the
-similarity between what was read and what would have been read at the particle, resampled,
-and carried on by the arm's translation to the next contact, where each is put back on the
+Particles start uniformly over the surface. At each contact they are weighted by the
+similarity between the reading and the predicted reading at the particle, resampled,
+and moved by the arm's translation to the next contact, where each is projected onto the
 surface. The ten most similar particles are the candidates; their mean is the answer.
 """
 
@@ -370,7 +370,7 @@ def _solve_run(
     seconds: dict[str, float],
     heard: StrikeEvidence | None,
 ) -> PosteriorSolution:
-    """Compute the posterior of the first ``count`` contacts; add the seconds of each stage."""
+    """Compute the posterior of the first ``count`` contacts; add the seconds of each stage to the clock."""
     if accuracy.of(SENSES) == "audio":
         assert heard is not None
         start = time.perf_counter()
@@ -449,7 +449,7 @@ def needs_images(setting: Setting) -> bool:
 
 
 def particle_filter(search: Search, count: int, particles: int, seed: int) -> Particles:
-    """Run the filter by touch over the first ``count`` contacts."""
+    """Run the particle filter on the tactile images of the first ``count`` contacts."""
 
     def similarity(contact: int, at: IntArray, yaws: FloatArray) -> FloatArray | None:
         """Cosines between what the gel read and what it would have read at each particle."""

@@ -1,4 +1,4 @@
-"""The sections of a localization's report, and what its answer gives the simulation."""
+"""The sections of a localization's report, and the inputs of its simulation."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -318,7 +318,7 @@ def _fit(gate: Gate | None) -> str:
 
 
 def _expected(run: RunFiles, contact: int) -> Iterator[str]:
-    """Yield the error that the choice of a contact predicted; nothing for planned contacts."""
+    """Yield the error that was predicted when a contact was chosen; nothing for planned contacts."""
     if run.scene.section(Localization).choose != "planned":
         error = run.recording.step(contact).step.parameters.get(EXPECTED)
         if error is not None:

@@ -1,4 +1,4 @@
-"""The section of a localization's report on its senses: posteriors, strikes, and the peaks of their sound."""
+"""The section of a localization's report on its senses: posteriors, strikes and resonances."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ _CLOSE_UP_PIXELS = 460
 
 
 def gather_strikes(scored: ScoredContact) -> StrikeEvidence | Missing:
-    """Return the evidence of a run's strikes, or why there is none."""
+    """Return the evidence of a run's strikes, or the reason why there is none."""
     found = scored.found
     if not scored.run.scene.sensors.sound:
         return Missing("the scene called for no sound")
@@ -61,13 +61,13 @@ def gather_strikes(scored: ScoredContact) -> StrikeEvidence | Missing:
 def show_senses(
     scored: ScoredContact, object_from_gel: FloatArray, sides: Sides, album: Album
 ) -> Iterator[PageBlock]:
-    """Show what each sense contributed to a run's answer, or why there is nothing to show.
+    """Show the contribution of each sense to a run's answer, or the reason why there is none.
 
     Args:
         scored: the run and its answer.
         object_from_gel: ``(4, 4)`` estimated gel pose of the last contact.
         sides: views of the object.
-        album: of the page.
+        album: album of the page.
     """
     heard = gather_strikes(scored)
     if isinstance(heard, Missing):
@@ -144,12 +144,12 @@ def _strikes(found: Answer, heard: StrikeEvidence, album: Album) -> Iterator[Pag
 
 
 def format_strike(contact: int, strike: Strike | None, unused: str) -> tuple[str, ...]:
-    """Return the row of a strike: greatest force, contact time and greatest pressure.
+    """Return the row of a strike: peak force, contact time and peak pressure.
 
     Args:
-        contact: from 1.
-        strike: None where the contact was not struck.
-        unused: why it does not count; empty where it does.
+        contact: number of the contact, from 1.
+        strike: evidence of the strike; None if the contact was not struck.
+        unused: reason why the strike is not used; empty if it is.
     """
     state = f"not used: {unused}" if unused else "used"
     if strike is None or strike.silent:
@@ -186,7 +186,7 @@ def _until(falling: FloatArray, level: float) -> float:
 def pair_spectrograms(
     found: Answer, heard: StrikeEvidence
 ) -> tuple[int, "Spectrogram", "Spectrogram"] | Missing:
-    """Return the last contact whose strike counts, and its sound as recorded and as modelled."""
+    """Return the last contact with a usable strike, and its spectrograms as recorded and as modelled."""
     counted = heard.struck[heard.term.evidence.used]
     if not len(counted):
         return Missing("no strike counts")
@@ -200,20 +200,20 @@ def pair_spectrograms(
 
 
 def estimate_sound_scale(found: Answer, heard: StrikeEvidence) -> float:
-    """Return the ratio of the object's frequencies to the model's, most probable at the answer."""
+    """Estimate the ratio of the object's frequencies to the model's at the answer."""
     struck = [int(k) for k in heard.struck]
     return heard.term.scale_at(found.last.contacts[struck], _directions(found, struck))
 
 
 def _directions(found: Answer, contacts: Sequence[int]) -> FloatArray:
-    """``(K, 3)`` unit, in the object's frame: directions of the hammer, under the answer's yaw."""
+    """Return the ``(K, 3)`` unit directions of the hammer in the object's frame at the answer's yaw."""
     object_from_base = found.readings.prior.object_from_base(np.array([found.last.yaw]))[0]
     axes = np.array([found.readings.observations[k].base_from_gel[:3, 2] for k in contacts])
     return np.asarray(axes @ object_from_base.T)
 
 
 def match_peaks(found: Answer, heard: StrikeEvidence) -> tuple[ModeRow, ...] | Missing:
-    """Return the resonances that the strikes have in common, each with its modes at the answer."""
+    """Match the common resonances of the strikes to the modes at the answer."""
     evidence = heard.term.evidence
     if int(evidence.used.sum()) < 2:
         return Missing(
@@ -264,7 +264,7 @@ def _peaks(found: Answer, heard: StrikeEvidence) -> Iterator[PageBlock]:
 
 
 def format_peak(peak: ModeRow, weight: float) -> tuple[str, ...]:
-    """Return the row of a peak and of the modes that it is matched to; ``weight`` is that of its ratio."""
+    """Return the row of a peak and its matched modes; ``weight`` is the weight of its likelihood ratio."""
     numbers = [str(mode + 1) for mode in peak.modes]
     model = (NONE, NONE, NONE)
     if peak.modes:
@@ -331,17 +331,17 @@ def sound_pair(
     direction: FloatArray,
     factor: float,
 ) -> tuple[Spectrogram, Spectrogram]:
-    """Return a strike as recorded, and as its own force would sound at a point of the model.
+    """Return the sound of a strike as recorded, and as simulated with its force at a point of the model.
 
-    Neither room nor microphone is in the simulated one, and its level at 0.3 m is an upper bound.
+    The simulation has no room and no microphone; its level at 0.3 m is an upper bound.
 
     Args:
-        strike: the recorded one.
-        modes: of the object.
-        material: for the damping.
-        point: ``(3,)`` metres, in the object's frame.
-        direction: ``(3,)`` unit, of the blow.
-        factor: real frequency over the model's, as the estimate found it.
+        strike: recorded strike.
+        modes: modes of the object.
+        material: material, for its damping.
+        point: ``(3,)`` m, struck point in the object's frame.
+        direction: ``(3,)`` unit direction of the strike.
+        factor: estimated ratio of the object's frequencies to the model's.
     """
     frequencies = factor * modes.frequencies
     amplitudes = modes.gains(point[None], direction[None]) * radiation(modes, _DISTANCE)

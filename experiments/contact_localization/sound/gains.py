@@ -1,11 +1,11 @@
-"""How loudly each mode sounds from each place of an object, as a table that a search reads.
+"""Tables of the loudness of each mode at each point of an object, for the search.
 
-Every row of ``y`` and of the gains comes divided by its noise, so that the matrix of the angular
+Every row of ``y`` and of the gains is divided by its noise, so that the matrix of the angular
 Gaussian is ``I + G G^T`` with a real ``(K, r)`` block ``G``, ``r`` at most ``MOST_RANK``; by Woodbury
-and the determinant lemma only ``r`` by ``r`` systems are left.
+and the determinant lemma only ``r`` by ``r`` systems remain.
 
-Hypotheses go side by side through every loop, so that one instruction serves several, and peaks are
-weighed as densities: products, and a logarithm only before a product might leave a double's range.
+Loops are vectorised over hypotheses, and peaks are
+combined as products of densities, with a logarithm only before a product might leave a double's range.
 """
 
 from dataclasses import dataclass

@@ -393,7 +393,7 @@ def likely_scales(peaks: FloatArray, modes: FloatArray, noise: SoundNoise) -> Sc
 
 
 def _pairs_of(peaks: FloatArray, groups: FloatArray, factors: FloatArray, noise: SoundNoise) -> Pairs:
-    """Find the groups of modes near each peak, under each of ``(S,)`` scales."""
+    """Find the groups of modes near each peak at each of ``(S,)`` frequency scales."""
     starts, found, shares = [0], [], []
     clutter = np.ones((len(factors), len(peaks)))
     for index, peak in enumerate(peaks):

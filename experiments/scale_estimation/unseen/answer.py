@@ -112,7 +112,7 @@ def ways_alone(
 
 
 def together_without_shape(beliefs: Mapping[str, Belief]) -> Belief:
-    """Combine the beliefs of several senses about an object of unknown shape; a single one stays as it is."""
+    """Combine the posteriors of several senses for an object of unknown shape; one alone stays unchanged."""
     if len(beliefs) == 1:
         return next(iter(beliefs.values()))
     return fused(

@@ -118,7 +118,7 @@ class OutlineProblem:
         self._weight = 1.0 / (PIXEL_SIGMA * np.sqrt(ALIKE))
 
     def fit(self, starts: FloatArray, rounds: int, fixed_size: bool = False) -> list[OutlineFit]:
-        """From ``(k, 14)`` starts down to the nearest minimum each, by damped Gauss-Newton steps."""
+        """Minimise from ``(k, 14)`` starts by damped Gauss-Newton steps."""
         here = starts.copy()
         residuals, slopes = self._residuals(here)
         cost = 0.5 * (residuals**2).sum(axis=1)

@@ -47,14 +47,14 @@ INFORMATIVE = "family, continued"
 
 
 class RunningShape:
-    """Estimates after one press more each time.
+    """The estimates of a run after each press.
 
-    By ``INFORMATIVE`` each begins at the hypotheses of that before it and at a few draws of its own, from the
-    first press on, whichever are requested: a run that is resumed, or replayed, goes where it went. After a
-    poor fit the hypotheses may all be of a wrong form, and the search also begins from scratch.
+    With ``INFORMATIVE`` each search starts at the hypotheses of the previous estimate and at a few random
+    shapes, from the first press on, so that a resumed or replayed run repeats its presses. After a
+    poor fit the hypotheses may all have a wrong form, and the search also starts from scratch.
 
     Args:
-        method: ``INFORMATIVE``, or a key of ``METHODS``, by which each estimate stands alone.
+        method: ``INFORMATIVE``, or a key of ``METHODS``, whose estimates are independent.
     """
 
     def __init__(self, method: str) -> None:
@@ -62,7 +62,7 @@ class RunningShape:
         self._estimates: dict[int, ShapeEstimate | None] = {}  # by the number of presses
 
     def after(self, evidence: ShapeEvidence) -> ShapeEstimate | None:
-        """Return the estimate from all presses of some evidence, solved once; None if they are too few.
+        """Return the cached estimate from all presses of some evidence; None if they are too few.
 
         Args:
             evidence: readings of the run up to a press.
@@ -87,7 +87,7 @@ _OF_RUNS: WeakKeyDictionary[RunFiles, dict[str, RunningShape]] = WeakKeyDictiona
 
 
 def get_running_shape(run: RunFiles, method: str) -> RunningShape:
-    """Return the estimates during a run, which its explorer and its report share."""
+    """Return the estimates of a run, which its explorer and its report share."""
     return _OF_RUNS.setdefault(run, {}).setdefault(method, RunningShape(method))
 
 
@@ -289,12 +289,12 @@ def live_method(choose: Choice) -> str:
 def live_estimates(
     evidence: ShapeEvidence, running: RunningShape, last: ShapeEstimate | None = None
 ) -> Iterator[tuple[ShapeEvidence, ShapeEstimate | None]]:
-    """Yield the readings up to some of a run's presses, in their order, and the estimate; None if too few.
+    """Yield the readings up to some presses of a run, and their estimate; None if they are too few.
 
     Args:
         evidence: readings of the whole run.
         running: the estimates so far; missing ones are solved.
-        last: the estimate from all presses, if it is known by the same method.
+        last: the estimate from all presses, if the same method has computed it.
     """
     for count in counts_shown(len(evidence.touches)):
         part = replace(evidence, touches=evidence.touches[:count])

@@ -313,7 +313,7 @@ def _rim_data(
     low: FloatArray,
     high: FloatArray,
 ) -> SurfaceData:
-    """Find the points where a field is smallest along rays of the border, as data of the surface."""
+    """Find the minima of a field along rays of the border, as data of the surface."""
     pixels, outward = _border(silhouette)
     pose = silhouette.look.stand_from_camera
     origin = pose[:3, 3]

@@ -57,9 +57,9 @@ def author_audio(
     report: Report,
     threads: int = 1,
 ) -> AuthoredAudio:
-    """Make and measure a network for canonical modes (``data.canonical``) with ``(m,)`` dampings in 1/s.
+    """Train and measure a network for canonical modes (``data.canonical``) with ``(m,)`` dampings in 1/s.
 
-    ``seed`` is that of the split and of the waves, ``threads`` are those of the fit.
+    ``seed`` is the random seed of the split and of the waves, ``threads`` the number of threads of the fit.
     """
     split = split_nodes(len(modes.points), seed=seed)
     seconds: dict[str, float] = {}
@@ -152,9 +152,9 @@ def _sound_errors(
 
 
 def waves_graph(network: Waves, storage: Storage = "float32") -> ModelProto:
-    """Plane waves as a graph, from points in metres to the shapes of the modes there.
+    """Write plane waves as a graph, from points in metres to the shapes of the modes there.
 
-    Points are float64: an object scanned far from its origin would lose the digits that tell its points apart
+    Points are float64: an object scanned far from its origin would lose the digits that distinguish its points
     before they are normalised. The linear layer has the storage type, the waves themselves are float32: an
     error of a wave vector is large at the far ends of the object.
     """

@@ -68,13 +68,13 @@ def build_audio(
     """Build an object's sound, or continue a build that was stopped.
 
     The folder ``out`` keeps its other modalities and its mesh; modes are kept in ``store``, so that a build
-    that is begun again need not solve again.
+    that is repeated does not solve again.
 
     Raises:
-        WrongUse: options that cannot be.
-        MeshRefused: a mesh that cannot stand for an object, or none of whose modes is in reach.
-        DataRefused: an ObjectFile in the folder that is of something else; or what was
-            written does not read back.
+        WrongUse: options that conflict or are out of range.
+        MeshRefused: a mesh that is no solid object, or without a mode in the frequency range.
+        DataRefused: the folder has an ObjectFile of another object, or a written file does not read
+            back.
     """
     chosen = profile(wanted.profile)
     report("reading the mesh", 0.0)

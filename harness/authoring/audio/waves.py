@@ -96,14 +96,14 @@ def fit_waves(
     reaches: tuple[float, ...],
     storage: Storage = "float32",
 ) -> FittedWaves:
-    """Fit a network of ``width`` waves for each of the reaches, and return the one that predicts best.
+    """Fit a network of ``width`` waves for each spread of wave vectors, and return the most accurate one.
 
     Args:
-        samples: places and shapes to learn.
-        measured: samples that the choice is made by (``solve_readout``).
+        samples: points and mode shapes to fit.
+        measured: validation samples that select the network (``solve_readout``).
         number: the object's wave number (``wave_number``), rad/m.
         width: number of waves.
-        seed: random seed of their vectors and phases.
+        seed: random seed of the wave vectors and phases.
         reaches: standard deviations of the vectors along an axis, relative to the wave number.
         storage: storage type of the linear layer in the file.
     """
@@ -128,10 +128,10 @@ def fit_waves(
 def fit_enough_waves(
     samples: SoundSamples, measured: IntArray, number: float, spec: WavesSpec, seed: int
 ) -> FittedWaves:
-    """As ``fit_waves``; with twice the waves while the error foretold is above ``ENOUGH``.
+    """Fit waves as ``fit_waves``, and double their number until the predicted error is below ``ENOUGH``.
 
-    Twice the waves reach farther by the square root of two at the same density on a surface, so that
-    this is tried beside the reach that was best before. ``spec`` states how many waves are tried first.
+    Twice the waves spread wider by the square root of two at the same density on a surface, so that
+    this is tried next to the previous best spread. ``spec`` states how many waves are tried first.
     """
     width = spec.width
     best = fit_waves(samples, measured, number, width, seed, spec.reaches, spec.storage)
