@@ -294,7 +294,7 @@ def phase_score(peak: Peak, modes: FloatArray, noise: PhaseNoise) -> float | Non
 
 
 def skirts_at(peak: Peak, modes: FloatArray) -> FloatArray:
-    """Compute the ``(m,)`` energy of each mode's tail at a peak, relative to an equally broad and loud mode there."""
+    """Compute the ``(m,)`` energies of the modes' tails at a peak, relative to an equal mode there."""
     apart = np.maximum(np.abs(np.log(modes / peak.frequency)), _NEXT)
     return np.asarray((half_width(peak) / apart) ** 2)
 

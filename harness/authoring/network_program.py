@@ -17,7 +17,7 @@ DEVICES = ("auto", "cpu", "cuda")
 
 
 def training_parser(description: str, profile: str) -> argparse.ArgumentParser:
-    """Create a parser with the options of every training, ``profile`` being the default one."""
+    """Create a parser with the options of every training and the default ``profile``."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument(
         "--profile", default=profile, help=f"amounts of samples and of the fit; {profile} if left out"
@@ -61,7 +61,7 @@ def device_of(asked: str) -> str:
     """Return ``"cpu"`` or ``"cuda"`` for one of ``DEVICES``; needs torch.
 
     Raises:
-        WrongUse: ``"cuda"`` is asked for, and torch finds no such device.
+        WrongUse: ``"cuda"`` is requested, and torch finds no such device.
     """
     import torch
 
@@ -102,7 +102,7 @@ def read_networks(folder: Path, names: Iterable[str], train: str) -> dict[str, b
         train: command that trains them, for messages.
 
     Raises:
-        DataRefused: there is none, or a card is missing or no JSON.
+        DataRefused: there is no network, or a card is missing or not JSON.
     """
     found = {}
     for path in [folder / f"{name}.onnx" for name in names]:

@@ -40,7 +40,7 @@ def provenance_of(
     settings: Mapping[str, str | float | int | bool | None],
     sources: tuple[Source, ...],
 ) -> Provenance:
-    """State by which code, from which sources, with which seed and settings a part was built."""
+    """Return the code, sources, seed and settings that a part was built with."""
     builder = f"harness.authoring.{part}.object_{part}"
     return Provenance(
         code={builder: content_hash(builder)},
@@ -52,7 +52,7 @@ def provenance_of(
 
 
 def source_of(mesh: str, licence: str) -> Source:
-    """Return the source of a mesh, a file or ``builtin:`` and a name; with the hash of a file.
+    """Return the source of a mesh, a file or ``builtin:`` and a name, with the hash of the file.
 
     Raises:
         WrongUse: there is no such file.
@@ -67,10 +67,10 @@ def source_of(mesh: str, licence: str) -> Source:
 def created_object(
     origin: str, licence: str, material: Material, mesh: Mesh, out: Path, source: Source
 ) -> ObjectFile:
-    """Open the object in the folder ``out``, or create it where there is none.
+    """Open the object in the folder ``out``, or create it if there is none.
 
     Raises:
-        WrongUse: the folder holds an object of another mesh or material.
+        WrongUse: the folder has an object of another mesh or material.
     """
     if not (out / DESCRIPTION).exists():
         name = Path(origin.removeprefix(BUILTIN)).stem

@@ -63,7 +63,7 @@ TextTable: TypeAlias = tuple[str, list[str], list[list[str]]]
 
 
 def text_tables(result: Result) -> Iterator[TextTable]:
-    """Yield the vectors as one table, then every field that holds records or maps names to mappings."""
+    """Yield the vectors as one table, then every field of records or of mappings by name."""
     shown = list(_shown(result))
     vectors = {name: value for name, value in shown if isinstance(value, np.ndarray) and value.ndim == 1}
     if vectors:

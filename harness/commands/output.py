@@ -88,7 +88,7 @@ def warn(sentence: str) -> None:
 
 
 def print_stop(stop: TouchstoneError, folder: Path, as_json: bool) -> int:
-    """Print that Ctrl-C ended a session after a step, and how to resume it; return the exit code."""
+    """Print that Ctrl-C ended a session, and the command that resumes it; return the exit code."""
     CONSOLE.print(str(stop), markup=False)
     if as_json:
         kind = {"kind": stop.kind(), "exit_code": stop.exit_code, "recording": str(folder)}

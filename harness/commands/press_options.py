@@ -102,7 +102,7 @@ class PressPose(TypedDict):
 def read_pose(
     contact: Contact, depth: Depth = None, tilt: Tilt = None, azimuth: Azimuth = None, yaw: Yaw = None
 ) -> PressPose:
-    """Read the options of a pose; ``WrongUse`` names the one that cannot be read."""
+    """Read the options of a pose; ``WrongUse`` names the option that cannot be read."""
     from harness.basics.quantities import ANGLE, LENGTH
 
     return {

@@ -28,7 +28,7 @@ _LEAST_SPREAD = 0.05
 
 
 def predicted_at_most(values: FloatArray, share: float = KEPT) -> float:
-    """Return what the next of ``(n,)`` such positive values, n >= 2, is below with probability ``share``.
+    """Return the upper bound of the next of ``(n,)`` positive values, n >= 2, with probability ``share``.
 
     The one-sided prediction bound for one future observation, of the logarithms taken as normal
     (Hahn and Meeker, Statistical Intervals, 1991, section 4.6):
@@ -141,7 +141,7 @@ class ParallelLines:
 
 
 def lines(point: Point, by_work: bool) -> ParallelLines:
-    """Fit parallel lines of the logarithm of seconds over that of work, one an object, by least squares.
+    """Fit parallel lines of log seconds over log work, one line per object, by least squares.
 
     An analysis of covariance (Montgomery, Design and Analysis of Experiments, section 15.3). Lines are level
     if not ``by_work``, or if a run has no work.

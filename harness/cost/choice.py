@@ -53,9 +53,9 @@ def for_budget(
 def for_error(points: Sequence[Point], error: float, name: str | None) -> tuple[Point, ...]:
     """Return the settings to try in turn until one promises an error in m: the cheapest on average first.
 
-    A first try that cannot promise it is followed by the setting that most often can, so a try
+    A first setting that cannot promise it is followed by the setting that can most often, so a try
     costs its own seconds and, as often as it fails, those of the other. Only settings on the front
-    are looked at: of many, some would seem to promise well by luck. One or two settings are returned.
+    are considered: of many, some would have small errors by chance. One or two settings are returned.
     """
     points = front(points)
     shares = {point.name: promise_share(point, name, error) for point in points}

@@ -57,11 +57,11 @@ class _Record:
 
 
 def doubt(point: Point, radius: float, name: str | None) -> float:
-    """Return the uncertainty of an answer in m: the geometric mean of its claim and its object's record.
+    """Return the uncertainty of an answer in m: the geometric mean of its claim and its object's error.
 
-    An answer that claims little error of an object on which the setting errs much is not as sure as one of an
-    object on which it never did. Only the order of doubts counts, see ``promises``. An object that was not
-    measured has the record of all.
+    A small claimed error is less reliable for an object on which the setting has large errors.
+    Only the order of the uncertainties matters, see ``promises``. An object that was not
+    measured has the errors of all objects.
     """
     return _Record.of(point.samples).doubt(radius, name)
 
@@ -106,9 +106,9 @@ def promises(point: Point, share: float = MET) -> tuple[FloatArray, FloatArray]:
 
 
 def promise(point: Point, radius: float, name: str | None, share: float = MET) -> float:
-    """Return the distance in m within which the truth lies, in ``share`` of runs, by the claimed radius in m.
+    """Return the error bound in m that holds in the fraction ``share`` of runs, for a claimed radius in m.
 
-    Infinity if too few runs were measured, or none of so much doubt.
+    Infinity if too few runs were measured, or none of such uncertainty.
     """
     limits, promised = promises(point, share)
     group = int(np.searchsorted(limits, doubt(point, radius, name)))

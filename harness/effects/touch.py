@@ -182,7 +182,7 @@ def compute_darkening(
     sensor_shadow_table: ShadowTable,
     sensor_rest: FloatArray | None = None,
 ) -> tuple[Float32Array, FloatArray]:
-    """Compute how much shadows darken each picture, as ``harness.sim.optics.shadow.darkening``."""
+    """Compute the darkening of each picture by shadows, as ``harness.sim.optics.shadow.darkening``."""
     calibration, table = sensor_calibration, sensor_shadow_table
     return darkening(touch_colour, touch_height_map, touch_gel, sensor, calibration, table, sensor_rest)
 

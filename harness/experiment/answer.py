@@ -57,14 +57,14 @@ def score(
     """Compute the answer, and compare it with the truth if that is known.
 
     Args:
-        experiment: that the run is of.
+        experiment: experiment of the run.
         run: folder of the run.
-        accuracy: of the answer.
-        answering: that has the readings already; None to take them from the folder.
-        folder: folder of ``result.json``; None if none is written.
+        accuracy: levels of the answer.
+        answering: estimator with the readings; None to read them from the folder.
+        folder: folder of ``result.json``; None to write none.
 
     Raises:
-        WrongUse: the run holds no step yet.
+        WrongUse: the run has no step yet.
         FitRefused: nothing explains the readings.
     """
     recording = run.recording
@@ -100,19 +100,19 @@ def finish(
     more: JsonObject | None = None,
     since: float | None = None,
 ) -> JsonObject:
-    """The result of a run: written and published once it is known, then again with what the report adds.
+    """Write and publish the result of a run, then write it again with the keys that the report adds.
 
     Args:
-        experiment: that the run is of.
+        experiment: experiment of the run.
         run: folder of the run.
-        accuracy: of the answer and of what is simulated.
-        draw: writes the report.
-        health: of the instruments; None for a replay.
-        folder: for result and report; the run's own where None.
-        answering: that has the readings already.
-        publish: is given the result before the report is drawn.
+        accuracy: levels of the answer and of the simulation.
+        draw: function that writes the report.
+        health: health of the instruments; None for a replay.
+        folder: folder of result and report; the run's own if None.
+        answering: estimator with the readings.
+        publish: function that receives the result before the report is rendered.
         more: further keys of the result.
-        since: s on the bench clock, when the last step was on the disk; the result says how long after.
+        since: time in s on the bench clock at which the last step was on the disk.
     """
     folder = folder or run.recording.folder
     written = write_answer(experiment, run, accuracy, folder, answering, publish, more, since)

@@ -50,12 +50,12 @@ def measure(
     Args:
         measured: measurement of the experiment.
         wanted: the runs.
-        asked: the answers.
+        asked: steps and setting of each answer.
         scenes: scenes by object.
         station: a mocked station.
         folder: folder of the files; those of another machine or of other code are measured again.
-        say: is given the reason for each run that cannot be planned, performed or answered, and is left out.
-        workers: number of processes that perform runs; this one measures the answers while the others rest.
+        say: function that receives the reason for each run that cannot be planned, performed or answered.
+        workers: number of processes that perform runs; this process measures the answers while they are idle.
 
     Yields:
         Each run with its points, of one sample each.
@@ -120,7 +120,7 @@ def measure_sample(cell: RunCell, run: Solver, setting: Setting) -> Sample:
 def _uncollected() -> Iterator[None]:
     """Disable garbage collection, as the standard library's ``timeit`` does.
 
-    In a process that holds dozens of runs a collection takes 0.1 s and more; in a run's own it does not.
+    In a process with dozens of runs in memory a collection takes 0.1 s and more.
     """
     collected = gc.isenabled()
     gc.disable()

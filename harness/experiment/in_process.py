@@ -71,13 +71,13 @@ def record_run(
 
     Args:
         experiment: the experiment.
-        cell: the run; its name is that of its folder.
+        cell: the run; its name is the name of its folder.
         scene: scene of the run.
         station: a mocked station.
         folder: folder of all recordings. A run is performed in another folder and moved here when complete.
 
     Raises:
-        WrongUse: a run of that name is there, with another scene, seed or gap.
+        WrongUse: the folder has a run of that name with another scene, seed or gap.
     """
     path = folder / cell.name
     if path.exists():
@@ -134,7 +134,7 @@ def _require_same(found: Recording, experiment: AnyExperiment, cell: RunCell, sc
 
 
 def _within(wanted: object, there: object) -> bool:
-    """Return whether a recorded scene, which states its defaults too, has every value of a scene."""
+    """State whether a recorded scene, which includes the defaults, has every value of a scene."""
     if isinstance(wanted, Mapping) and isinstance(there, Mapping):
         return all(_within(value, there.get(key)) for key, value in wanted.items())
     return bool(wanted == there)

@@ -39,7 +39,7 @@ DEFAULT = "default"
 
 @dataclass(frozen=True)
 class MeasuredCondition:
-    """A condition that a table or a cost curve varies, beside object, gap and seed."""
+    """A condition that a table or a cost curve varies, in addition to object, gap and seed."""
 
     name: str  #: ``"spacing"``.
     levels: tuple[str, ...]  #: all levels.
@@ -83,11 +83,11 @@ class PlainRun:
         """Return None: every setting can be answered."""
 
     def prepare(self, setting: Setting) -> None:
-        """Create the readings once: an experiment then computes and loads what it needs."""
+        """Create the readings once, so that an experiment computes and loads its models."""
         self._answering(setting)
 
     def shares_preparation(self, _one: Setting, _other: Setting) -> bool:
-        """Return True."""
+        """State that settings share all preparation."""
         return True
 
     def work(self, _setting: Setting) -> float:
@@ -134,7 +134,7 @@ class Measurement:
     """
 
     cell: type[RunCell] = RunCell  #: class of its runs.
-    conditions: tuple[MeasuredCondition, ...] = ()  #: conditions beside object, gap and seed.
+    conditions: tuple[MeasuredCondition, ...] = ()  #: conditions in addition to object, gap and seed.
     counts: tuple[int, ...] = (1,)  #: default numbers of steps of a cost curve.
     gross = 20.0e-3  #: m: a larger error is a failure, unless a row states ``gross`` itself.
     regions: tuple[str, ...] = ()  #: methods whose 90 % region a table scores.
@@ -170,7 +170,7 @@ class Measurement:
     def cells(
         self, objects: Sequence[str], seeds: Sequence[int], chosen: Mapping[str, Sequence[str]]
     ) -> list[RunCell]:
-        """List the runs, one seed of every object before the next: a table that is stopped is even."""
+        """List the runs, seed by seed, so that a stopped table has equally many of each object."""
         names = ("gap", *(condition.name for condition in self.conditions))
         return [
             self.cell(object=name, seed=seed, **dict(zip(names, levels, strict=True)))
@@ -182,7 +182,7 @@ class Measurement:
     def run_cell(
         self, cell: RunCell, scene: SceneFile, station: Station, recordings: Path | None = None
     ) -> JsonObject:
-        """Perform a run, or take it from ``recordings``, and answer it by every method.
+        """Perform a run, or open it in ``recordings``, and answer it by every method.
 
         Returns:
             ``rows`` by method, each with ``error_m`` and ``seconds``; a row may have ``error_symmetric_m``,
@@ -220,7 +220,7 @@ class Measurement:
     def setting_name(self, setting: Setting) -> str:
         """Return the name of a setting, for the operator."""
         titles = (title for title, levels in self.settings.items() if levels == setting)
-        return next(titles, "every dial at its finest")
+        return next(titles, "every knob at its finest level")
 
     def solver(self, files: RunFiles, _cell: RunCell | None = None) -> Solver:
         """Return a run's readings, to be answered at any setting.
@@ -232,12 +232,12 @@ class Measurement:
         return PlainRun(self.experiment, files, files.recording.committed)
 
     def notes(self) -> tuple[str, ...]:
-        """Return sentences that a cost curve keeps, once its runs are answered."""
+        """Return sentences that a cost curve stores after its runs are answered."""
         return ()
 
     @property
     def finest(self) -> Setting:
-        """Setting that is answered after a budget, to state what more time would have given."""
+        """Setting that is answered after a budget, to state the error with more time."""
         return {knob.name: knob.levels[-1] for knob in self.experiment.own_knobs}
 
     def shipped_curve(self) -> Curve | None:
@@ -245,11 +245,11 @@ class Measurement:
         return None
 
     def condition(self, _scene: SceneFile) -> Mapping[str, Level]:
-        """Return the condition of a scene's runs as a curve has it, without the number of steps."""
+        """Return the condition of a scene's runs in a curve, without the number of steps."""
         return {"gap": "default"}
 
     def explain_refusal(self, _scene: SceneFile, setting: Setting) -> str | None:
-        """Return why a scene's runs cannot be answered at a setting of a stored curve; None if they can."""
+        """State why a scene's runs cannot be answered at a setting of a stored curve; None if they can."""
         try:
             Accuracy(self.experiment.own_knobs, setting)
         except WrongUse as refusal:
@@ -258,7 +258,7 @@ class Measurement:
         return None
 
     def is_offered(self, _setting: Setting) -> bool:
-        """Return whether a setting is chosen while there are others."""
+        """State whether a budget may choose a setting if there are others."""
         return True
 
 
@@ -277,7 +277,7 @@ def table_of(experiment: AnyExperiment) -> Measurement:
 
 
 def workers_of(number: int) -> AbstractContextManager[Executor | None]:
-    """Create a pool of processes, as a context; None in it if this process computes everything."""
+    """Create a context of a pool of processes; of None if this process computes everything."""
     return worker_pool(number) if number > 1 else nullcontext(None)
 
 
@@ -330,7 +330,7 @@ def perform_cells(
         scenes: scenes by object.
         station: a mocked station.
         pool: processes that perform the runs; None for this one.
-        say: is given the reason for each run that cannot be planned or performed, and is left out.
+        say: function that receives the reason for each run that cannot be planned or performed.
     """
     with TemporaryDirectory(prefix="touchstone-runs-", ignore_cleanup_errors=True) as folder:
         trees = dump_scenes(scenes)
@@ -344,7 +344,7 @@ def perform_cells(
 def _perform(
     name: str, trees: Mapping[str, JsonObject], station: Station, folder: Path, cell: RunCell
 ) -> str | None:
-    """Perform a run into a folder of recordings; return the reason if it cannot be."""
+    """Perform a run into a folder of recordings; return the reason if that is impossible."""
     scene = cell.create_scene(scene_from_json(trees[cell.object], "the cost of accuracy"))
     try:
         record_run(find_experiment(name), cell, scene, station, folder)

@@ -1,4 +1,4 @@
-"""Content of a run's report as plain values: the answer in words and numbers, and sections of the page."""
+"""The content of a run's report as plain values: the answer in words and numbers, and page sections."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ class AnswerValue:
 class Missing:
     """A part of the report that is not available."""
 
-    reason: str  #: end of a sentence: why it is not.
+    reason: str  #: reason, as the end of a sentence.
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Picture:
 class CaptionedPicture:
     """A picture with its caption."""
 
-    picture: Picture | Missing  #: the picture, or why there is none.
+    picture: Picture | Missing  #: the picture, or the reason why there is none.
     caption: (
         str  #: explanation below it; its first sentence describes the picture to readers who cannot see it.
     )
@@ -54,7 +54,7 @@ class CaptionedPicture:
 class Tiles:
     """Small pictures in a row, shown pixel for pixel."""
 
-    tiles: Sequence[tuple[str, Picture | Missing]]  #: title and picture of each.
+    tiles: Sequence[tuple[str, Picture | Missing]]  #: title and picture of each tile.
 
 
 @dataclass(frozen=True)
@@ -69,16 +69,16 @@ class Bar:
 class ReportTable:
     """A table."""
 
-    headings: Sequence[str]  #: one a column; empty for a table of names and values.
+    headings: Sequence[str]  #: heading of each column; empty for a table of names and values.
     rows: Sequence[Sequence[str | Bar]]  #: cells of each row.
     align: str  #: ``"l"`` or ``"r"`` for each column; columns to the right hold numbers.
 
 
 @dataclass(frozen=True)
 class TurnedSurface:
-    """A surface that a reader turns: arrays in base64, little endian, about the centre of the surface."""
+    """A surface that a reader rotates: base64 arrays, little endian, relative to the surface's centre."""
 
-    places: str  #: int16, three a vertex, in equal steps; z is up.
+    places: str  #: int16, three per vertex, in equal steps; z is up.
     faces: str  #: uint16, the three vertices of each.
     colours: str  #: uint8, red, green and blue of each vertex.
     marks: str  #: int16, three of each contact, in the same steps.
@@ -88,7 +88,7 @@ class TurnedSurface:
 class PageSection:
     """A part of the page under a heading."""
 
-    title: str  #: the heading.
+    title: str  #: heading of the section.
     blocks: Sequence["PageBlock"]  #: paragraphs, tables, pictures and subsections, from top to bottom.
 
 
@@ -105,4 +105,4 @@ class RunReport:
     sentence: str  #: the answer in words.
     values: Sequence[AnswerValue]  #: the answer in numbers.
     sections: Sequence[PageSection] = ()  #: readings and estimates in pictures.
-    seconds: Mapping[str, float] = field(default_factory=dict)  #: s that the answer took, by stage.
+    seconds: Mapping[str, float] = field(default_factory=dict)  #: duration of the answer in s, by stage.

@@ -1,4 +1,4 @@
-"""Targets of an answer, and the solver of a run that is answered to them."""
+"""Targets of an answer, and the solver of a run that meets them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,10 +39,10 @@ Found_co = TypeVar("Found_co", covariant=True)
 
 @dataclass(frozen=True, eq=False)
 class Solved(Generic[Found_co]):
-    """An answer at one setting, and its seconds beyond those that settings share."""
+    """An answer at one setting, and its seconds without those that settings share."""
 
     found: Found_co | None  #: the answer; None if it was refused.
-    radius: float | None  #: m, radius that the answer claims with 90 %; None if it claims none.
+    radius: float | None  #: m, 90 % radius of the answer; None if it has none.
     cpu: float  #: s of CPU time.
     wall: float  #: s on the clock.
     refusal: str | None = None  #: reason of a refusal.
@@ -66,19 +66,19 @@ class Solver(Protocol):
         """Return the readings of the first steps alone."""
 
     def explain_refusal(self, setting: Setting) -> str | None:
-        """Return why these readings cannot be answered at a setting; None if they can."""
+        """State why these readings cannot be answered at a setting; None if they can."""
 
     def prepare(self, setting: Setting) -> None:
-        """Compute what a setting needs of the object alone and load its kernels; no budget counts it."""
+        """Compute a setting's models of the object and load its kernels; budgets do not count this time."""
 
     def shares_preparation(self, one: Setting, other: Setting) -> bool:
-        """Return whether ``one`` needs nothing prepared that ``other`` does not."""
+        """State whether the preparation of ``other`` includes that of ``one``."""
 
     def work(self, setting: Setting) -> float:
-        """Return how much there is to do, see ``harness.cost.curve.Sample``."""
+        """Return the amount of work, see ``harness.cost.curve.Sample``."""
 
     def read(self, setting: Setting) -> tuple[float, float]:
-        """Read what settings share and this one uses; return its CPU and wall time in s."""
+        """Compute the shared readings that a setting uses; return their CPU and wall time in s."""
 
     def solve(self, setting: Setting) -> AnySolved:
-        """Compute the answer at one setting, timed from what ``read`` computes."""
+        """Compute the answer at one setting; its time starts after ``read``."""

@@ -33,7 +33,7 @@ def objects(data: Path | None, real: Mapping[str, tuple[str, str, str]] = REAL) 
 
     Args:
         data: the data folder; None if it is absent.
-        real: real meshes, as ``REAL``.
+        real: paths and materials of real meshes, as in ``REAL``.
     """
     scenes = {name: scene_from_options(f"builtin:{name}") for name in MATERIALS}
     for name, (file, units, material) in real.items():

@@ -54,7 +54,7 @@ def measure(
     workers: int,
     recordings: Path | None = None,
 ) -> Iterator[tuple[RunCell, JsonObject]]:
-    """Perform and answer the runs that have no file yet; yield the result of each run as it is known.
+    """Perform and answer the runs that have no file yet; yield each result when it is complete.
 
     Args:
         experiment: the experiment.
@@ -62,8 +62,8 @@ def measure(
         scenes: scenes by object.
         folder: folder of the results, one JSON file per run.
         workers: number of processes; 1 for this one alone.
-        recordings: folder that keeps the runs themselves; those in it are answered and not performed again.
-            None to keep none.
+        recordings: folder that stores the runs; a run in it is answered and not performed again.
+            None to store none.
     """
     folder.mkdir(parents=True, exist_ok=True)
     missing = []
@@ -85,7 +85,7 @@ def _run(name: str, trees: Mapping[str, JsonObject], recordings: Path | None, ce
     try:
         return table_of(find_experiment(name)).run_cell(cell, scene, station, recordings)
     except TouchstoneError as error:
-        # A run that cannot be planned or performed is reported as such; it is no measurement.
+        # A run that cannot be planned or performed is reported, and is not a measurement.
         return {"schema": 1, "failed": f"{type(error).__name__}: {error}"}
 
 
@@ -139,11 +139,11 @@ def key_of(cell: RunCell) -> Key:
 def by_object(
     results: Mapping[RunCell, JsonObject], condition: Key, value: str = "error_m"
 ) -> dict[str, dict[str, float]]:
-    """Compute the mean in m of every method on every object: of the error if no other value is named.
+    """Compute the mean in m of every method on every object, of the error or of another value.
 
     Args:
-        results: of the cells.
-        condition: as ``key_of`` gives it; runs of others are left out.
+        results: results of the runs.
+        condition: result of ``key_of``; runs of other conditions are left out.
         value: key of a row; a method without it on an object is left out.
     """
     found: dict[str, dict[str, list[float]]] = {}

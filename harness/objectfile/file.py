@@ -57,7 +57,7 @@ class ObjectFile:
 
     @cached_property
     def content_key(self) -> str:
-        """A hash of all that the folder holds: ``object.json`` names the hash of every file."""
+        """A hash of all contents of the folder, as ``object.json`` has the hash of every file."""
         return hashlib.sha256(description_text(self.description).encode()).hexdigest()
 
     @cached_property
@@ -115,10 +115,10 @@ def file_entry(name: str, data: bytes) -> FileEntry:
 def create_object(
     folder: Path, name: str, mesh: Mesh, material: Material, provenance: Provenance
 ) -> ObjectFile:
-    """Create an ObjectFile without any modality; the mesh is in metres, and the provenance is its.
+    """Create an ObjectFile without any modality from a mesh in metres and the mesh's provenance.
 
     Raises:
-        WrongUse: the folder holds an ObjectFile already.
+        WrongUse: the folder already has an ObjectFile.
     """
     if (folder / DESCRIPTION).exists():
         raise WrongUse(f"{folder} holds an ObjectFile already; open it, or name another folder")
@@ -151,12 +151,12 @@ def with_part(
     entry: AudioEntry | TouchEntry | VisionEntry,
     contents: Mapping[str, bytes],
 ) -> ObjectFile:
-    """Write a modality into an ObjectFile, in place of what there was of it; see ``write_described``.
+    """Write a modality into an ObjectFile, replacing an earlier version; see ``write_described``.
 
     ``contents`` holds the bytes of every file that the entry names, by name.
 
     Raises:
-        DataRefused: entry and contents do not belong together.
+        DataRefused: the entry does not describe the contents.
     """
     tree = of.description.model_dump(mode="json", by_alias=True)
     tree[modality] = entry.model_dump(mode="json")

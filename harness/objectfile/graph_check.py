@@ -38,7 +38,7 @@ def checked_graph(data: bytes, name: str) -> ModelProto:
     """Read and check the graph in the bytes of the file ``name``.
 
     Raises:
-        DataRefused: it is no graph, or one that must not be run, with the reason.
+        DataRefused: the bytes are no graph, or one that must not be run; the message has the reason.
     """
     try:
         model = onnx.load_model_from_string(data)

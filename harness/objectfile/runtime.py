@@ -28,13 +28,13 @@ class Network:
     Args:
         data: bytes of the file.
         name: name of the file, for messages.
-        inputs: inputs that it must have.
-        outputs: outputs that it must have.
-        threads: threads of one run.
+        inputs: inputs that the graph must have.
+        outputs: outputs that the graph must have.
+        threads: number of threads of one run.
         only: names of the outputs that are computed; empty for all.
 
     Raises:
-        DataRefused: the graph must not be run, or is not the one described.
+        DataRefused: the graph must not be run, or does not fit the description.
     """
 
     def __init__(

@@ -12,7 +12,7 @@ def open_network(data: bytes, entry: NetworkEntry, threads: int = 1, only: tuple
     """Open the network of an entry from its file's bytes and run its self-test; see ``Network``.
 
     Raises:
-        DataRefused: as ``Network``; or it answers otherwise than when it was made.
+        DataRefused: as ``Network``; or the outputs differ from those at build time.
     """
     network = Network(data, entry.file, entry.inputs, entry.outputs, threads, only)
     require_self_test(network, entry.self_test)
@@ -20,10 +20,10 @@ def open_network(data: bytes, entry: NetworkEntry, threads: int = 1, only: tuple
 
 
 def require_self_test(network: Network, test: SelfTest) -> float:
-    """Return the greatest difference from the outputs when it was made, relative to the greatest number.
+    """Return the largest difference from the outputs at build time, relative to the largest output.
 
     Raises:
-        DataRefused: it is more than the tolerance, or the test is none.
+        DataRefused: the difference exceeds the tolerance, or the test is empty.
     """
     named = zip(network.inputs, test.inputs, strict=True)
     queries = {item.name: queries_of(item, values, test.rows) for item, values in named}

@@ -164,10 +164,10 @@ def _look_at_graph(run: Opened) -> str:
 
 
 def look_at_domain(of: Either, run: Opened) -> str:
-    """Query a network all over the domain that it claims.
+    """Query a network at random inputs of its stated domain.
 
     Raises:
-        DataRefused: a number is not finite, or an output has another shape than described.
+        DataRefused: an output is not finite, or has another shape than described.
     """
     network, random = run(), np.random.default_rng(0)
     queries = {item.name: _queries(of, item, random) for item in network.inputs}
@@ -190,10 +190,10 @@ def look_at_domain(of: Either, run: Opened) -> str:
 
 
 def look_at_self_test(run: Opened, test: SelfTest) -> str:
-    """Query what was queried when the network was made.
+    """Repeat the queries of the network's self-test.
 
     Raises:
-        DataRefused: the answer differs by more than the tolerance, or the test is none.
+        DataRefused: the outputs differ by more than the tolerance, or the test is empty.
     """
     worst = require_self_test(run(), test)
     return f"as when it was made, to {worst:.1e} of the greatest number ({test.tolerance:g} is allowed)"
@@ -228,7 +228,7 @@ def _shape(tensor: Tensor, rows: int) -> tuple[int, ...]:
 
 
 def look_at_codes(of: ObjectFile, entry: CodesEntry) -> str:
-    """Compare maps of upright presses at some coded places with the rasterised mesh.
+    """Compare maps of upright presses at some coded points with the rasterised mesh.
 
     Raises:
         DataRefused: the maps are not of one object.
@@ -260,7 +260,7 @@ def _look_at_networks(of: ObjectFile, entry: VisionEntry) -> str:
 
 
 def _look_at_views(of: ObjectFile, entry: VisionEntry) -> str:
-    """Check from around that the networks are opaque where the surface is."""
+    """Check from views around the object that the networks are opaque at the surface."""
     vision, medians = open_vision(of, threads=1), []
     camera = camera_for(vision.surface, _PIXELS, _PIXELS)
     middle = vision.surface.bounds.mean(axis=0)

@@ -27,7 +27,7 @@ _STEPS_ROUND = 4
 def build(name: str, edge: float = 3e-3) -> Mesh:
     """Build a household object in metres, watertight; see ``harness.objects.builtin.build``.
 
-    A mesh that was built before is returned again.
+    A mesh that was built before is returned from a cache.
 
     The shape does not depend on ``edge``, the distance of neighbouring vertices where the surface is curved
     (across a quadrangle half as much again), beyond the flat faces' distance from the curve that they

@@ -24,7 +24,7 @@ _FINER = 1.0 / 40.0
 def ball(edge: float = 3e-3) -> Mesh:
     """Build a ball of radius ``BALL_RADIUS`` on a stem, standing on z = 0 about the z axis, in metres.
 
-    The ball's top is ``_HEIGHT`` radii above the foot. At the usual edge, of which a fortieth is taken, the
+    The ball's top is ``_HEIGHT`` radii above the foot. Edges have a fortieth of the usual length, so that the
     facets stay within a micrometre of the sphere. The mesh is watertight.
     """
     fine = edge * _FINER

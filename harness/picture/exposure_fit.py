@@ -47,7 +47,7 @@ class Together:
 
 
 def together(where: BoolArray, light: FloatArray) -> Together:
-    """Group the pixels that count by blocks and by the mean over colours of their ``(n, 3)`` light."""
+    """Group the used pixels by blocks and by the mean over colours of their ``(n, 3)`` light."""
     rows, columns = np.nonzero(where)
     block = _counted(rows // BLOCK * (where.shape[1] // BLOCK + 1) + columns // BLOCK)
     grey = light.mean(axis=1)
@@ -64,16 +64,16 @@ def _counted(numbers: AnyArray) -> AnyArray:
 
 
 def group_variance(moved: FloatArray, groups: Together) -> FloatArray:
-    """Variance of values that groups of pixels move, each kind of group as a whole.
+    """Compute the variance of fitted values with errors that are correlated within groups of pixels.
 
-    Pixels are not so many witnesses as there are. Noise, a highlight or a network's patch err alike in pixels
+    Pixels are not independent. Noise, a highlight or a network's patch have correlated errors in pixels
     that are near each other; a camera's curve and JPEG, which rounds a whole surface's colour to one code,
-    in those of one brightness. Both at once are groups of two kinds (Cameron, Gelbach and Miller, J. Business
+    in pixels of one brightness. These are two kinds of groups (Cameron, Gelbach and Miller, J. Business
     and Economic Statistics 29(2), 2011).
 
-    Of blocks, and of shades, less what both count: a group. It is never less than that of blocks alone.
+    The result is the variance by blocks plus that by shades minus that by both, and at least that by blocks.
 
-    ``(groups, ...)`` states how far each group, of two blocks or more, moves each value.
+    ``(groups, ...)`` is the change of each value by each group of two blocks or more.
     """
     by_block = _squares(moved, groups.block, 1)
     if int(groups.shade.max()) + 1 < _FEWEST:
@@ -140,28 +140,27 @@ class RobustFit:
 
 
 def scatter(left: FloatArray) -> float:
-    """Compute the robust standard deviation of residuals by the median of their size."""
+    """Compute the robust standard deviation of residuals from the median of their absolute values."""
     return float(_NORMAL * np.median(np.abs(left)))
 
 
 def robust_fit(
     design: FloatArray, wanted: FloatArray, blocks: AnyArray, count: int, floor: float
 ) -> RobustFit | None:
-    """Fit values such that ``design @ values`` is ``wanted``, without regard to outliers.
+    """Fit values such that ``design @ values`` is ``wanted``, robust to outliers.
 
-    Least absolute deviations begin, Tukey's bisquare ends (Huber and Ronchetti, Robust Statistics, 2009,
-    chapters 4 and 7). Standard errors are by blocks of points, which may disagree for any reason (Liang and
-    Zeger, 1986, with blocks as clusters).
+    The fit starts with least absolute deviations and ends with Tukey's bisquare (Huber and Ronchetti, 2009,
+    chapters 4 and 7). Standard errors are clustered by blocks of points (Liang and Zeger, 1986).
 
     Args:
         design: ``(n, values)`` of full rank, finite.
         wanted: ``(n,)`` finite.
         blocks: ``(n,)`` integers, the block of each point, 0 to ``count - 1``.
-        count: of blocks; two or more.
-        floor: least scale, as of rounding; greater than zero.
+        count: number of blocks, two or more.
+        floor: minimum scale, e.g. of rounding; greater than zero.
 
     Returns:
-        None where no values hold most points together, or none settle to 1e-7.
+        None if no values fit most points, or the fit does not converge to 1e-7.
     """
     # Least absolute deviations, to a few parts of the scatter, where the bisquare takes over.
     start = _weighted(design, wanted, np.ones(wanted.size))

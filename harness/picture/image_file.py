@@ -1,4 +1,4 @@
-"""Pictures and textures on disk, RGB in memory: any file OpenCV reads, and PNG to write."""
+"""Pictures and textures on disk, RGB in memory: any format of OpenCV to read, and PNG to write."""
 
 from io import BytesIO
 from pathlib import Path
@@ -24,10 +24,10 @@ def require_modest_picture(
     refused: type[TouchstoneError] = DataRefused,
     formats: tuple[str, ...] = FORMATS,
 ) -> None:
-    """Refuse bytes that are no picture of the formats of Pillow, or that unpack to more than ``MOST_PIXELS``.
+    """Refuse bytes that are no picture of Pillow's formats, or that unpack to more than ``MOST_PIXELS``.
 
     Raises:
-        TouchstoneError: of the class ``refused``.
+        TouchstoneError: an error of the class ``refused``.
     """
     most = f"a picture has at most {MOST_PIXELS:,}: shrink it"
     try:
@@ -93,10 +93,10 @@ def decode_texture(data: bytes, name: str) -> tuple[ByteArray, bool]:
     """Decode the picture of a texture, of 8 or 16 bits a channel, grey, with a palette or in colour.
 
     Returns:
-        ``(rows, columns, 3)`` RGB; and whether the picture is transparent somewhere, which is not followed.
+        ``(rows, columns, 3)`` RGB; and whether the picture has transparent pixels, which is ignored.
 
     Raises:
-        MeshRefused: no such picture, a damaged or huge one, or one of other numbers than 8 or 16 bits.
+        MeshRefused: the picture is of another kind, damaged or huge.
     """
     require_modest_picture(data, f"texture {name}", MeshRefused, (*FORMATS, *_BY_PILLOW))
     try:

@@ -59,7 +59,7 @@ class LinearImage:
 
 
 def binned(image: LinearImage, by: int) -> LinearImage:
-    """Merge ``by`` x ``by`` pixels to one, their mean; ``OutOfDomain`` if a side is no multiple."""
+    """Average ``by`` x ``by`` pixels to one; ``OutOfDomain`` if a side is no multiple of ``by``."""
     rows, columns = image.alpha.shape
     if by < 1 or rows % by or columns % by:
         raise OutOfDomain(f"a picture of {rows} x {columns} pixels is no whole number of {by} x {by}")

@@ -49,7 +49,7 @@ class LiveComparison:
     masked_by: str  #: ``"background"`` or ``"colours"``.
     overlap: float  #: of both, 0 to 1 (IoU).
     exposure: ExposureFit  #: the fit.
-    fitted: PictureDifference  #: over the silhouette.
+    fitted: PictureDifference  #: of the pixels in the silhouette.
     unfitted: PictureDifference  #: the same before anything was fitted.
     seconds: Mapping[str, float]  #: s on the clock by stage.
 

@@ -199,7 +199,7 @@ def unit_vector(vector: Vector, meaning: str) -> FloatArray:
     """Divide ``(3,)`` by its length; ``meaning`` names it in messages.
 
     Raises:
-        OutOfDomain: not three finite numbers, or no length.
+        OutOfDomain: the vector is not three finite numbers, or has no length.
     """
     given = _three(vector, meaning)
     # Divided by the largest first: a square of 1e-200 is zero and one of 1e200 no number.

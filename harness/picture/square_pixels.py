@@ -23,9 +23,9 @@ MADE_SQUARE = "made square by"
 
 
 def aspect_stated(made_from: str) -> float:
-    """Read a pixel's height over its width from ``made_from`` of a calibration's header; 1 if it states none.
+    """Read a pixel's height over its width from ``made_from`` of a calibration's header, by default 1.
 
-    Live pictures of that sensor are made square by it before anything else.
+    Live pictures of that sensor are resampled to square pixels with it.
 
     Raises:
         OutOfDomain: an aspect that is none of a camera.

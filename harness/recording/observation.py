@@ -94,7 +94,7 @@ def _needed(record: StepRecord, name: str) -> Reading:
 
 
 def picture_left_out(step: int, why: object) -> str:
-    """State for people that the picture of a step, counted from 0, is not used, and why."""
+    """State in a sentence that the picture of a step, counted from 0, is not used, and why."""
     return f"step {step + 1}: its picture is left out: {why}"
 
 

@@ -98,13 +98,13 @@ def create_run(
     mock: Mapping[str, Any] | None,
     acquisition: AcquisitionCalibration | None = None,
 ) -> Recording:
-    """Create a run folder with everything that an estimate needs; see ``RunHeader``.
+    """Create a run folder with all inputs of an estimate; see ``RunHeader``.
 
     One process creates it; another process with the same folder is refused and removes nothing. Mesh and
-    calibration are those that the estimator is to know; ``acquisition`` is None for a run without sound.
+    calibration are those of the estimator; ``acquisition`` is None for a run without sound.
 
     Raises:
-        WrongUse: the folder holds a run or is being written to, or files there have the names that a run
+        WrongUse: the folder has a run or is being written to, or files there have the names that a run
             uses; or the scene names an ObjectFile of another object.
         DataRefused: that ObjectFile is damaged.
     """

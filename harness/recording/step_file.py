@@ -55,9 +55,9 @@ class StepRecord:
 
 
 def write_step(path: Path, record: StepRecord, clock_offset_ns: int) -> None:
-    """Write beside ``path``, flush to the disk, then rename: a crash leaves the whole file or none.
+    """Write a step atomically: to a file next to ``path``, flushed to the disk, then renamed.
 
-    The file keeps the clock offset, wall clock minus bench clock of the session.
+    The file includes the clock offset of the session, wall clock minus bench clock.
     """
     stream = BytesIO()
     # JPEG does not compress again; the numbers are few.
@@ -96,11 +96,11 @@ def _write_reading(writer: Writer, reading: Reading, clock_offset_ns: int) -> No
 def read_step(path: Path, clock_offset_ns: int, summed: bool = True) -> StepRecord:
     """Read the step of a file.
 
-    ``clock_offset_ns``, wall clock minus bench clock, is for files that do not keep that of their session.
+    ``clock_offset_ns``, wall clock minus bench clock, is for files that do not include it.
     Only files of runs of schema 1 need no checksum.
 
     Raises:
-        RecordingDamaged: missing, or other bytes than were written; the file is named.
+        RecordingDamaged: the file is missing, or its bytes are not those that were written.
     """
     return step_of(_read(path), path, clock_offset_ns, summed)
 

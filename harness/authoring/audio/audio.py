@@ -154,7 +154,7 @@ def _sound_errors(
 def waves_graph(network: Waves, storage: Storage = "float32") -> ModelProto:
     """Write plane waves as a graph, from points in metres to the shapes of the modes there.
 
-    Points are float64: an object scanned far from its origin would lose the digits that distinguish its points
+    Points are float64: an object scanned far from its origin would lose the digits by which points differ
     before they are normalised. The linear layer has the storage type, the waves themselves are float32: an
     error of a wave vector is large at the far ends of the object.
     """

@@ -44,12 +44,12 @@ class BuildPlan:
 def build_plan(
     rows: Sequence[tuple[CatalogueRow, str]], spec: BuildSpec, of: BuildFolder, retry: bool = False
 ) -> BuildPlan:
-    """Compare a catalogue with what is on the disk; reads every mesh once, for its hash.
+    """Compare a catalogue with the files on the disk; every mesh is read once, for its hash.
 
     With ``retry`` objects that failed are tried again.
 
     Raises:
-        WrongUse: a spec that cannot be built, or a mesh that is not there.
+        WrongUse: a specification that cannot be built, or a missing mesh.
     """
     spec.check()
     items = tuple(build_item(row, mesh, spec) for row, mesh in rows)
@@ -128,7 +128,7 @@ class LocalRunner:
     def _finished(
         self, waiting: deque[tuple[Job, int]], workers: list[ObjectWorker]
     ) -> Iterator[ObjectRecord]:
-        """Wait until a job ends, and yield the records of all that have; a job that died once waits again."""
+        """Wait until a job ends, and yield the records of finished jobs; a job that died once is repeated."""
         busy = [worker for worker in workers if worker.job is not None]
         wait_for(busy)
         for worker in busy:

@@ -89,14 +89,14 @@ def _named(path: str) -> Iterator[None]:
 def publish(
     of: BuildFolder, store: ObjectStore, on: Callable[[str, float], None] = lambda *_: None
 ) -> list[SentObject]:
-    """Copy every object of a build, which may be running, that stands and is not there yet.
+    """Copy every finished object of a build, which may be running, that is not in the store yet.
 
-    ``on`` gets the name and the fraction that is done before each object.
+    ``on`` receives the name and the completed fraction before each object.
 
     Raises:
         WrongUse: nothing was built into the folder.
         DataRefused: a file is not the one that was built.
-        OSError: the store refused a file; what was copied stays, and the next call goes on.
+        OSError: the store refused a file; copied files remain, and the next call continues.
     """
     names = read_settings(of).names
     found = []

@@ -336,7 +336,7 @@ def read_toml_rows(path: Path) -> list[tuple[str, dict[str, str]]]:
 
 
 class MeshFolder:
-    """The meshes below a folder by the names that rows may have: files, and folders of one object each."""
+    """The meshes in a folder by the names of rows: files, and folders of one object each."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

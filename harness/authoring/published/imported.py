@@ -75,7 +75,7 @@ def written(parts: ImportedParts, kind: Format, source: Source, name: str, out: 
     """Write the parts of a file to the folder ``out``, which is created.
 
     Raises:
-        DataRefused: the parts do not hold together.
+        DataRefused: the parts do not fit each other.
     """
     described = {
         "schema": SCHEMA,

@@ -79,7 +79,7 @@ class SkipPerceptron(Trunk):
         return self.output_linear(self.features(encoded))
 
     def features(self, encoded: Tensor) -> Tensor:
-        """``(n, encoded)`` to ``(n, width)``, the input of the last layer."""
+        """Compute the ``(n, width)`` input of the last layer from ``(n, encoded)``."""
         return super().forward(encoded)
 
 

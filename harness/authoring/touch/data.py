@@ -33,10 +33,10 @@ _CHUNK = 64
 
 
 def choose_nodes(mesh: Mesh, spacing: float, seed: int = 0) -> SurfaceNodes:
-    """Choose places so dense that every place of the surface has one near, with a normal like its own.
+    """Choose points so dense that every point of the surface has a near one with a similar normal.
 
-    Random places, each kept if none before it is within ``spacing``, in m, of it. Normals that differ
-    count as distance (``touch_nodes.BEND``), so both sides of an edge have places of their own.
+    Random points are added if no earlier point is within ``spacing`` in m. A difference of normals
+    counts as distance (``touch_nodes.BEND``), so both sides of an edge have their own points.
 
     Raises:
         WrongUse: a spacing that is not positive.

@@ -39,9 +39,9 @@ def build_touch(wanted: TouchRequest, out: Path, report: Report, threads: int = 
     """Build an object's touch into the folder ``out``, which keeps its other modalities and its mesh.
 
     Raises:
-        WrongUse: options that cannot be.
-        MeshRefused: a mesh that cannot stand for an object.
-        DataRefused: an ObjectFile in the folder that is of something else.
+        WrongUse: options that conflict or are out of range.
+        MeshRefused: a mesh that is no solid object.
+        DataRefused: the folder has an ObjectFile of another object.
     """
     chosen = touch_profile(wanted.profile)
     begun = time.perf_counter()

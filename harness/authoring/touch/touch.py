@@ -75,10 +75,10 @@ def author_touch(
     report: Report,
     threads: int = 1,
 ) -> AuthoredTouch:
-    """Make and measure the codes of one object's touch, for a flat gel and its skirt in pixels.
+    """Compute and measure the codes of one object's touch, for a flat gel and its border width in pixels.
 
     Raises:
-        WrongUse: a file too small for any codes of this object.
+        WrongUse: a size limit too small for any codes of this object.
     """
     begun = time.perf_counter()
     report("coding the surface", 0.0)
@@ -175,7 +175,7 @@ def code_surface(
     Patches cover the window of the sensor at any yaw.
 
     Raises:
-        WrongUse: no node is to be seen.
+        WrongUse: no node is visible.
     """
     viewer = _Viewer(raster, sensor, spec)
     probe = TactileSensor("probe", 1, 1, 1e-6, 1.0)

@@ -145,7 +145,7 @@ class CellTraining:
 
 
 class CellLessons:
-    """Lessons by cell: of the places in it, a little beyond its border, or the nearest if those are few."""
+    """Training samples by cell: the points in it and near its border, or the nearest if those are few."""
 
     def __init__(self, spec: CellsSpec, grid: VisionGrid, lessons: Lessons, lamps: AnyArray) -> None:
         self._size, self._grid, self._lessons, self._lamps = spec.size, grid, lessons, lamps
@@ -158,7 +158,7 @@ class CellLessons:
         return cKDTree(self._lessons.points)
 
     def lesson(self, cell: int) -> Lesson:
-        """Gather the lesson of a cell."""
+        """Gather the training samples of a cell."""
         lessons, grid = self._lessons, self._grid
         at = self._places[self._starts[cell] : self._starts[cell + 1]]
         if len(at) < self._least:

@@ -47,7 +47,7 @@ class Way:
 
 
 def ways(spec: CellsSpec, side: int) -> tuple[Way, ...]:
-    """Return the default, of networks ``spec`` and ``side`` pixels, then every knob at every other level."""
+    """List the default of networks ``spec`` and ``side`` pixels, then every knob at every other level."""
     plain = Way(DEFAULT, DEFAULT, spec, side)
     drawn: list[tuple[str, str, RenderSettings]] = [
         *(("coverage, sub-pixels", str(of), RenderSettings(coverage=of)) for of in COVERS),
@@ -100,10 +100,10 @@ class Studio:
     _exact: dict[int, list[LinearImage]] = field(default_factory=dict)
 
     def train(self, spec: CellsSpec, seed: int, folder: Path, report: Report) -> None:
-        """Take networks from an existing folder, or train them there; a training that was killed continues.
+        """Load networks from an existing folder, or train them there; an interrupted training continues.
 
         Raises:
-            DataRefused: a file of that name that is of something else.
+            DataRefused: a file of that name with other contents.
         """
         name = self._key(spec, seed)
         kept, checkpoint = folder / f"{name}.onnx", folder / f".{name}.npz"
@@ -154,7 +154,7 @@ class Studio:
 
 
 def measured(asked: Sequence[Way], studio: Studio, repeat: int, report: Report) -> tuple[PictureCost, ...]:
-    """Measure errors and seconds of each way, whose networks the studio has."""
+    """Measure errors and seconds of each choice of levels, whose networks the studio has."""
     worth = []
     for number, way in enumerate(asked):
         report("comparing pictures", 0.5 * number / len(asked))

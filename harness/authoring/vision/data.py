@@ -63,10 +63,10 @@ class HeldOutViews:
 def held_out_pictures(
     mesh: Mesh, count: int, width: int, height: int, seed: int, distance: float = 2.0, apart: float = APART
 ) -> HeldOutViews:
-    """Sample one or more cameras all around an object, each with a light of its own; see ``around``.
+    """Sample one or more cameras around an object, each with its own light; see ``around``.
 
     Raises:
-        WrongUse: no picture, or a camera inside the object's box.
+        WrongUse: no camera, or a camera inside the object's bounding box.
     """
     if count < 1 or not distance > 0.5:
         raise WrongUse(

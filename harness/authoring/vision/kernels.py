@@ -1,6 +1,6 @@
-"""One tiny network's training, compiled: batches of places and lamps, layers, Adam (Kingma and Ba, 2015).
+"""Compiled training of one small network: batches of points and lights, layers, Adam (Kingma and Ba, 2015).
 
-Cells know nothing of each other, so that a network and all it learns from stay in a core's second cache.
+Cells are independent, so that a network and its training data stay in the L2 cache of a core.
 Numbers are float32. Colours are compared as roots of linear light, near to how a screen shows them.
 """
 

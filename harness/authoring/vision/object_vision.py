@@ -40,14 +40,14 @@ def build_vision(
     report: Report,
     threads: int | None = None,
 ) -> BuiltVision:
-    """Build an object's look, or continue a training that was stopped; threads are all cores if None.
+    """Build an object's vision, or continue a stopped training; all cores are used if ``threads`` is None.
 
     The folder ``out`` keeps its other modalities and its mesh.
 
     Raises:
-        WrongUse: options that cannot be.
-        MeshRefused: a mesh that cannot stand for an object.
-        DataRefused: a checkpoint or an ObjectFile in the folder that is of something else.
+        WrongUse: options that conflict or are out of range.
+        MeshRefused: a mesh that is no solid object.
+        DataRefused: the folder has a checkpoint or an ObjectFile of another object.
     """
     chosen = vision_profile(wanted.profile)
     begun = time.perf_counter()
@@ -74,10 +74,10 @@ def build_vision(
 
 
 def drawn_surface(mesh: Mesh, looked_at: Mesh) -> Mesh | None:
-    """Return the surface that pictures are rendered along; None where the object's mesh will do.
+    """Return the surface that pictures are rendered on; None if it is the object's mesh.
 
-    A look's surface comes with seams where its texture has them; they are closed, since which pixels a
-    closed surface covers is found faster, and an eye within it is noticed.
+    The surface has seams if its texture has them. They are closed, since the pixels that a
+    closed surface covers are found faster, and a camera inside it is detected.
     """
     return None if is_same_surface(mesh, looked_at) else without_seams(looked_at)
 

@@ -44,14 +44,14 @@ def author_vision(
     report: Report,
     threads: int | None = None,
 ) -> AuthoredVision:
-    """Make and measure the networks of one object's look; they are the same for any number of threads.
+    """Train and measure the networks of one object's vision; they are equal for any number of threads.
 
-    A training that was killed continues from its checkpoint in the folder, to the same bits.
+    An interrupted training continues from its checkpoint in the folder, with bit-equal results.
 
     Raises:
         MeshRefused: a surface without extent.
-        OutOfDomain: nothing of the surface can be seen from outside.
-        DataRefused: a checkpoint in the folder that cannot be gone on from.
+        OutOfDomain: no part of the surface is visible from outside.
+        DataRefused: a checkpoint in the folder that cannot be continued.
     """
     clock, lit = Laps(), LitObject(look)
     held_out = held_out_pictures(look.mesh, profile.pictures, profile.side, profile.side, seed)

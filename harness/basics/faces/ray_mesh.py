@@ -1,7 +1,7 @@
-"""A mesh prepared for rays: which face is met, where on it, and what is in the light's way.
+"""A mesh prepared for ray casting: the face and point that a ray hits, and occlusion of lights.
 
-Moeller and Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, J. Graphics Tools 2(1), 1997. Whoever
-changes the order of its sums changes pictures and walls in their last bits.
+Moeller and Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, J. Graphics Tools 2(1), 1997. Another
+order of its sums changes pictures and wall thicknesses in their last bits.
 """
 
 from dataclasses import dataclass

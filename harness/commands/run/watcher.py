@@ -1,4 +1,4 @@
-"""What a run reports, printed: prose and progress on standard error, the answer on standard output."""
+"""Print the reports of a run: progress on standard error, the answer on standard output."""
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
@@ -12,7 +12,7 @@ from harness.tasks.runs import PlannedRun, RunWatcher
 
 
 class TerminalWatcher(RunWatcher):
-    """Prints what a run reports; with ``--json`` neither the answer in words nor requests to the operator."""
+    """Prints the reports of a run; with ``--json`` neither the answer nor requests to the operator."""
 
     def __init__(self, as_json: bool) -> None:
         self._as_json = as_json
@@ -38,7 +38,7 @@ class TerminalWatcher(RunWatcher):
             self.report("comparing with the simulation, drawing the report")
 
     def show_plan(self, run: PlannedRun, begun: Begun) -> None:
-        """Print what is about to happen, and what is simulated at which levels."""
+        """Print the plan of the run, and the simulated effects with their levels."""
         experiment, files = run.experiment, run.files
         for line in begun.known.read:
             self.report(line)

@@ -100,7 +100,7 @@ def with_audio(of: ObjectFile, part: AudioPart) -> ObjectFile:
 
 
 def network_tensors(modes: int, near_surface: float) -> tuple[Input, Tensor]:
-    """Describe input and output of a network of sound; ``near_surface`` is the limit of ``AudioPart``."""
+    """Describe input and output of a network of sound; ``near_surface`` is as in ``AudioPart``."""
     points = Input(
         name="points",
         dtype="float64",

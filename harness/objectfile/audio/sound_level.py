@@ -91,7 +91,7 @@ def _require_dampings(of: ObjectFile, entry: AudioEntry, material: Material) -> 
 
 
 def _count(of: ObjectFile, entry: AudioEntry, most: int, limit: float) -> int:
-    """Return how many modes are kept; ``WrongUse`` if the object was built with fewer than requested."""
+    """Return the number of modes to use; ``WrongUse`` if the object was built with fewer than requested."""
     frequencies = np.array(entry.frequencies_hz)
     heard = int(np.count_nonzero(frequencies <= limit))
     if heard == len(frequencies) and entry.complete_up_to_hz < limit and heard + _SPARE < most:

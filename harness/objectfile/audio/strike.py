@@ -56,13 +56,13 @@ class StruckSound:
 
 
 def place_near(surface: SurfaceSearch, point: ArrayLike, most: float) -> Place:
-    """Find the place of a surface nearest to a ``(3,)`` point, at most ``most`` away, in m.
+    """Find the point of a surface nearest to a ``(3,)`` point, at a distance of at most ``most`` m.
 
     Its normal is that of its face.
 
     Raises:
-        WrongUse: it is not three finite numbers.
-        OutOfDomain: it is farther; the distance and the limit are named.
+        WrongUse: the point is not three finite numbers.
+        OutOfDomain: the surface is farther; the message states distance and limit.
     """
     asked = checked_points(np.array(point, dtype=np.float64)[None])
     low, high = surface.mesh.bounds

@@ -196,7 +196,7 @@ def read_rows(path: Path, columns: int, meaning: str) -> FloatArray:
 def answer_queries(
     of: Object, queries: Mapping[str, Rows], settings: QuerySettings, out: Path
 ) -> AnsweredQueries:
-    """Answer query files in a folder for each sense in ``out``; ``OutOfDomain`` if they are untrained."""
+    """Answer query files, one folder per sense in ``out``; ``OutOfDomain`` outside the training domain."""
     answered = AnsweredQueries()
     writers = {"audio": _write_sounds, "touch": _write_touches, "vision": _write_views}
     for sense, rows in queries.items():

@@ -140,7 +140,7 @@ the ``(3,)`` unit light direction to ``(n, 4)`` raw red, green, blue and density
 
 
 def osf_field(network: Network) -> RawField:
-    """Return the field of one network for all points."""
+    """Return the radiance field of a single network for all points."""
 
     def raw(points: FloatArray, views: FloatArray, light: FloatArray) -> FloatArray:
         lights = np.broadcast_to(light, points.shape)

@@ -1,8 +1,8 @@
 """Touch of imported objects: maps of distance (version 2.0) and their pictures, or colours (1.0).
 
 ``TaximPicture`` is ObjectFolder 2.0's own use of Taxim, with its calibration. The published program takes
-millimetres a pixel from the real sensor and distances from a virtual camera with others; slopes are a quarter
-too steep near the axis because of it, and the colours were fitted to them so.
+the pixel size of the real sensor and distances of a virtual camera with another one. Slopes are therefore
+a quarter too steep near the axis, and the colours were fitted to these slopes.
 """
 
 import math
@@ -134,13 +134,13 @@ class TaximPicture:
         """Open the calibration of a folder, for maps of a shape.
 
         Raises:
-            CalibrationRefused: no published calibration, without the untouched gel's shape, or of another
-            camera.
+            CalibrationRefused: no published calibration, one without the untouched gel's shape, or one
+            of another camera.
         """
         pack = read_published(folder, PITCH)
         if pack.rest is None or pack.rest.shape != shape:
             raise CalibrationRefused(
-                f"{folder} has no untouched gel of {shape[0]} x {shape[1]} pixels (depth_bg.npy); give the "
+                f"{folder} has no shape of the untouched gel of {shape[0]} x {shape[1]} pixels (depth_bg.npy); give the "
                 f"folder that ObjectFolder 2.0 publishes, with {TABLE} and {PRESSES}"
             )
         table, rest = read_table(folder / TABLE), pack.rest / PITCH
@@ -150,8 +150,8 @@ class TaximPicture:
         """Compute ``(rows, columns, 3)`` RGB of 0 to 255, not rounded.
 
         Args:
-            depth: ``(rows, columns)`` distance from the camera, m.
-            pressed: depth of the press, m.
+            depth: ``(rows, columns)`` distance from the camera in m.
+            pressed: depth of the press in m.
         """
         height = (SEEN_DEPTH[1] - depth) / PITCH
         contact = height - self.rest > _CORE * pressed / PITCH
@@ -165,11 +165,11 @@ class TaximPicture:
         return found
 
     def image(self, depth: FloatArray, pressed: float) -> ByteArray:
-        """Compute the picture, rounded; arguments as ``colours``."""
+        """Compute the picture, rounded to integers; arguments as ``colours``."""
         return np.rint(self.colours(depth, pressed)).astype(np.uint8)
 
     def compat_image(self, depth: FloatArray, pressed: float) -> ByteArray:
-        """Compute the picture as the published program does: cut off below, blue where red belongs."""
+        """Compute the picture as the published program does: clipped at 0, with red and blue exchanged."""
         return np.ascontiguousarray(self.colours(depth, pressed)[..., ::-1]).astype(np.uint8)
 
 
@@ -178,7 +178,7 @@ def table_colours(height: FloatArray, table: FloatArray) -> FloatArray:
 
     Args:
         height: ``(rows, columns)`` pixels.
-        table: ``(bins, bins, 6, 3)``: by steepness and direction, a polynomial of the place.
+        table: ``(bins, bins, 6, 3)``: a polynomial of the position for each steepness and direction.
     """
     colours = np.empty((*height.shape, 3))
     change_exactly(height, table, colours)

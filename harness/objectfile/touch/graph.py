@@ -180,9 +180,9 @@ def _check(patches: PatchCodes, sensor: TactileSensor, lookups: int) -> None:
 
 
 def hung(nodes: Nodes, deep: str, sensor: TactileSensor, skirt: GelSkirt) -> str:
-    """Add the gel's skirt, as ``harness.sim.gel.gel.deform``, to ``(n, rows, columns)`` m of penetration.
+    """Add the contact border (``harness.sim.gel.gel.deform``) to ``(n, rows, columns)`` m of penetration.
 
-    Blurs are products with banded matrices.
+    Each blur is a product with a banded matrix.
     """
     deepest = nodes.add("ReduceMax", deep, axes=[1, 2], keepdims=1)
     core = nodes.add("Mul", deepest, nodes.constant(np.array(skirt.core, np.float32)))

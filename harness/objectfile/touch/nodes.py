@@ -96,7 +96,7 @@ def nodes_from(data: bytes, name: str) -> SurfaceNodes:
     """Read nodes from a ``.npy`` file of float64 ``(n, 6)``, points in metres and normals.
 
     Raises:
-        DataRefused: it holds something else.
+        DataRefused: the file has other contents.
     """
     rows = npy_array(data, name, "<f8", (None, 6), "nodes of float64 (n, 6)")
     lengths = np.linalg.norm(rows[:, 3:], axis=1)

@@ -127,10 +127,10 @@ class CodedDepth:
 
 
 def open_tool_depth(of: ObjectFile, threads: int = 1) -> CodedDepth:
-    """Open the codes of an object's touch for first surfaces along a tool.
+    """Open the codes of an object's touch to compute first hits along a tool axis.
 
     Raises:
-        DataRefused: it has no codes, or a file of it is damaged.
+        DataRefused: the object has no codes, or a file of it is damaged.
     """
     touch, entry = touch_of(of), coded(of)
     nodes = NodeSearch(nodes_of(of, entry), entry.most_off_m)

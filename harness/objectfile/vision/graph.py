@@ -167,7 +167,7 @@ def sort_into_blocks(networks: IntArray, every: int, size: int) -> tuple[IntArra
 def vision_tensors(
     grid: VisionGrid, size: NetworkSize, block: int = BLOCK
 ) -> tuple[tuple[Input, ...], tuple[Tensor, ...]]:
-    """Describe the inputs and outputs of ``vision_graph``; ``block`` samples are of one network."""
+    """Describe the inputs and outputs of ``vision_graph``; ``block`` samples share a network."""
     (a, b, c), (d, e, f) = grid.low.tolist(), grid.high.tolist()
     return box_tensors(len(grid), ((a, b, c), (d, e, f)), size.extras, block)
 
@@ -226,10 +226,10 @@ class _Blocks:
 
 
 def vision_graph(model: VisionModel, block: int = BLOCK) -> ModelProto:
-    """Write the graph of an object's look, weights as float16, for blocks of samples of one network.
+    """Write the graph of an object's vision, with float16 weights, for blocks of samples of one network.
 
     Raises:
-        WrongUse: weights that float16 cannot hold, or an empty block.
+        WrongUse: weights outside the range of float16, or an empty block.
     """
     if not 1 <= block <= 1024:
         raise WrongUse(f"blocks of {block} samples were asked for; 1 to 1024 are made")

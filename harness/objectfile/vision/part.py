@@ -77,7 +77,7 @@ def with_vision(of: ObjectFile, part: VisionPart) -> ObjectFile:
 def blocks_inside(
     model: VisionModel, count: int, block: int, random: np.random.Generator
 ) -> dict[str, AnyArray]:
-    """Sample ``count`` blocks of queries, each within the cell of its network, from the first to the last."""
+    """Sample ``count`` blocks of queries, each in the cell of its network, in the order of the cells."""
     grid, extras = model.grid, model.weights.size.extras
     networks = np.linspace(0, len(grid) - 1, count).astype(np.int64)
     shares = random.random((count, block, 3))

@@ -147,10 +147,10 @@ class ObjectVision:
     def picture(
         self, camera: Pinhole, light: DirectionalLight, settings: RenderSettings | None = None
     ) -> Rendered:
-        """Render the object under one light from far away; settings are the default if None.
+        """Render the object under a distant light; settings are the default if None.
 
         Raises:
-            OutOfDomain: a camera within the object, or a picture larger than is drawn, all its rays counted.
+            OutOfDomain: a camera inside the object, or more rays in the picture than the limit.
         """
         require_size(camera.width, camera.height, 1 if settings is None else settings.rays)
         require_outside(self.surface, camera.eye)
