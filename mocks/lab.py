@@ -138,7 +138,7 @@ _ORPHAN_CHECK = 0.5
 
 
 class Lab:
-    """The far ends of the instruments and what they are told."""
+    """The far ends of the instruments and their commands."""
 
     def __init__(self, bench: LabBench, truth: TruthFile) -> None:
         self._bench = bench

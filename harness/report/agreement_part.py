@@ -19,7 +19,7 @@ _SCALED = {"m": (1e3, "mm"), "Hz": (1e-3, "kHz"), "covered": (1.0, "covered")}
 
 
 def show_agreement(agreement: Agreement | None, album: Album) -> tuple[PageBlock, ...]:
-    """Show verdicts with their numbers, and a picture, which goes into the album."""
+    """Show verdicts with their numbers, and a picture in the album."""
     if agreement is None:
         return (Missing("the readings were not compared with a model"),)
     doubt = agreement.first_doubt

@@ -116,7 +116,7 @@ def _answer(report: RunReport, scored: AnyScored) -> tuple[PageBlock, ...]:
 
 
 def list_instruments(run: RunFiles, health: Mapping[str, Health] | None) -> ReportTable | Missing:
-    """List how each instrument did during the run.
+    """List the instruments with their readings and errors during the run.
 
     Args:
         run: folder of the run.
@@ -150,7 +150,7 @@ def list_instruments(run: RunFiles, health: Mapping[str, Health] | None) -> Repo
 
 
 def count_samples(reading: Reading) -> int:
-    """Count the samples of a reading: each of a block is one, a remark on a capture is none."""
+    """Count the samples of a reading: all samples of a block; a remark on a capture is no sample."""
     if reading.channel.name in _REMARKS:
         return 0
     return int(reading.values.size) if reading.channel.name in _IN_BLOCKS else len(reading.times)

@@ -1,4 +1,4 @@
-"""Numbers as an operator reads them, each with its unit."""
+"""Format numbers with their units for the operator."""
 
 from collections.abc import Callable, Iterator, Mapping
 
@@ -18,7 +18,7 @@ def millimetres(metres: float | None, digits: int = 2) -> str:
 
 
 def duration(seconds: float | None) -> str:
-    """Format a time with the unit that suits it, or a dash."""
+    """Format a duration with a suitable unit, or a dash."""
     if seconds is None:
         return NONE
     if seconds < 1e-3:
@@ -63,7 +63,7 @@ def format_key(key: str, value: object) -> tuple[str, str, str]:
     """Format a key of JSON and its value as name, value and unit.
 
     Args:
-        key: with its unit at the end: ``"gel_centre_m"``; dots separate the levels of a tree.
+        key: key that ends with its unit, e.g. ``"gel_centre_m"``; dots separate the levels of a tree.
         value: a number, a text or a list of numbers.
     """
     suffix = next((suffix for suffix in _UNITS if key.endswith(f"_{suffix}")), "")
@@ -99,9 +99,9 @@ def show_estimates(
 
     Args:
         estimates: estimates of a result by sense; values that are null have no row.
-        senses: names of the senses in the order of the rows.
-        quantities: names of the quantities by the key that they have in an estimate.
-        uncertainty: returns the uncertainty of an estimate's first quantity.
+        senses: names of the senses, in the order of the rows.
+        quantities: names of the quantities by their key in an estimate.
+        uncertainty: function that returns the uncertainty of an estimate's first quantity.
     """
     for sense, words in senses.items():
         estimate, first = estimates.get(sense, {}), next(iter(quantities))

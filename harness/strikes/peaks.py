@@ -57,7 +57,7 @@ class SoundEvidence:
 
 
 def analyse(strikes: Sequence[Strike], settings: Analysis | None = None) -> SoundEvidence:
-    """Find the resonances that strikes of one object have in common, and each strike's share of every one.
+    """Find the common resonances of strikes of one object, and the amplitude of each in every strike.
 
     Object and microphone are at rest.
 

@@ -82,9 +82,9 @@ class PoleFit:
 
 
 def fit_poles(lines: SpectralLines, omegas: FloatArray, decays: FloatArray, skirt: int) -> PoleFit:
-    """Refine ``(m,)`` poles in rad/s and 1/s until the lines, no fewer than the unknowns, are fitted best.
+    """Refine ``(m,)`` poles in rad/s and 1/s by least squares on at least as many lines as unknowns.
 
-    ``skirt`` is the number of terms of the polynomial.
+    ``skirt`` is the number of terms of the polynomial of distant modes.
     """
     problem = _Problem(lines, omegas, skirt)
     if len(omegas) == 0:
@@ -253,9 +253,9 @@ class PoleSearch:
 def new_poles(
     lines: SpectralLines, fit: PoleFit, search: PoleSearch, rounding: float
 ) -> list[tuple[float, float]]:
-    """Find peaks of the residual, strongest first: ``w`` in rad/s and ``d`` in 1/s to start a fit from.
+    """Find peaks of the residual, strongest first: initial ``w`` in rad/s and ``d`` in 1/s of a fit.
 
-    Below ``rounding`` of the strongest line of a channel everything is arithmetic.
+    Lines below ``rounding`` times the strongest line of a channel are rounding errors.
     """
     power = np.abs(fit.residual) ** 2
     reach = min(2 * search.floor_reach + 1, power.shape[1])
@@ -279,7 +279,7 @@ def new_poles(
 def _spread_out(
     lines: SpectralLines, fit: PoleFit, power: FloatArray, tops: AnyArray
 ) -> list[tuple[float, float]]:
-    """Keep the peaks that no stronger one can have caused: its skirt, or the other side of a misfit mode."""
+    """Select the peaks that are no side effect of a stronger peak: of its tail, or of a poorly fitted mode."""
     chosen: list[tuple[float, float]] = []
     reach: list[tuple[float, float]] = []
     known, widths = fit.omegas / (2.0 * np.pi), fit.decays / (2.0 * np.pi)

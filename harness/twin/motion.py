@@ -34,7 +34,7 @@ class Approach:
 
 @dataclass(frozen=True, eq=False)
 class _Planned:
-    """Travel to a contact or a strike."""
+    """The travel to a contact or a strike, as planned."""
 
     travelling: ClassVar[str]  #: name of the travel's segments.
 
@@ -43,7 +43,7 @@ class _Planned:
 
     @property
     def stand_off_joints(self) -> FloatArray:
-        """``(6,)`` rad: where the contact or the strike begins and ends."""
+        """Joints ``(6,)`` in rad at which the contact or the strike begins and ends."""
         return self.travel[-1] if len(self.travel) else self.start
 
     def travels(self, step: int) -> tuple[Segment, ...]:
@@ -64,7 +64,7 @@ class PlannedContact(_Planned):
     stand_off: float  #: m from there to the press.
 
     def segments(self, step: int) -> tuple[Segment, ...]:
-        """Return what the arm does for this contact, to be rehearsed."""
+        """Return the motions of the arm for this contact, to be rehearsed."""
         return (*self.travels(step), *self.lines(step))
 
     def searched(self, step: int, beyond: float, axis: FloatArray) -> Segment:
@@ -256,7 +256,7 @@ class PlannedStrike(_Planned):
     axis: FloatArray  #: ``(3,)`` unit in base, the way of the strike.
 
     def segments(self, step: int) -> tuple[Segment, ...]:
-        """Return what the arm does for this strike, to be rehearsed; it touches nothing, the striker does."""
+        """Return the motions of the arm for this strike, to be rehearsed; only the striker touches the object."""
         return (*self.travels(step), *self.lines(step))
 
     def lines(self, step: int) -> tuple[Segment, Segment]:

@@ -201,7 +201,7 @@ def _cross(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
 
 @compiled
 def _first_hit(corners: FloatArray, start: FloatArray, direction: FloatArray) -> float:
-    """Moeller and Trumbore, J. Graphics Tools 2(1), 1997; from either side.
+    """Find the first hit of a ray from either side (Moeller and Trumbore, J. Graphics Tools 2(1), 1997).
 
     Not by ``harness.basics.faces.ray_mesh``: its sums are those of ``np.dot``, another rounding, and
     rehearsed contacts are written with these.
@@ -229,9 +229,9 @@ def _first_hit(corners: FloatArray, start: FloatArray, direction: FloatArray) ->
 
 @compiled
 def _nearest(corners: FloatArray, point: FloatArray) -> FloatArray:
-    """Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
+    """Find the nearest point of a triangle (Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
 
-    By the weights of corners, which is up to a rounding away from ``basics.faces.nearest_surface``; rehearsed
+    It uses barycentric weights, which differ by rounding from ``basics.faces.nearest_surface``; rehearsed
     contacts are written with these.
     """
     best, best_gap = corners[0, 0].copy(), np.inf

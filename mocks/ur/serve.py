@@ -157,19 +157,19 @@ def serve(
     """Serve until ``should_stop``; every port is closed on return.
 
     Args:
-        config: of the controller.
-        contact: what the tool feels; nothing where None.
-        on_cycle: is told where the arm is.
-        should_stop: ends it.
-        step: of the run.
+        config: configuration of the controller.
+        contact: model of the contact force on the tool; None for no contact.
+        on_cycle: function that receives the pose of the arm in every cycle.
+        should_stop: function that returns true to end the server.
+        step: function that performs a step of the run.
         cues: faults to begin (``mocks.ur.serve``).
-        on_ready: is called once, when all ports listen.
-        answer: is told what became of each cue.
-        on_outputs: is told when a digital output changes.
+        on_ready: function that is called once, when all ports listen.
+        answer: function that receives the outcome of each cue.
+        on_outputs: function that is called when a digital output changes.
 
     Raises:
         OSError: an address or port that cannot be bound.
-        harness.basics.errors.WrongUse: a model that is not known.
+        harness.basics.errors.WrongUse: an unknown model.
     """
     sys.setswitchinterval(_SWITCH_INTERVAL)
     controller = Controller(config, contact, on_cycle, step, on_outputs)

@@ -104,7 +104,7 @@ class ContactDraw:
 
 
 class GapDraw:
-    """The draws of one run."""
+    """The random differences of one run between world and model."""
 
     def __init__(self, gap: Gap, seed: int) -> None:
         self.gap = gap

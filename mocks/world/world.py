@@ -167,7 +167,7 @@ class World:
         run = self._draw.run
         moved = translation(middle + run.position) @ transform(run.object_rotation, np.zeros(3))
         placed: FloatArray = moved @ translation(-middle) @ self._bench.base_from_object
-        self.base_from_object = read_only(placed)  #: ``(4, 4)``, where it truly stands.
+        self.base_from_object = read_only(placed)  #: ``(4, 4)`` true pose of the object.
         self._object_from_base = inverse(self.base_from_object)
         self._raster = RasterMesh(self.mesh)
         self._middle = apply(self.base_from_object, self.mesh.bounds.mean(axis=0)[None])[0]

@@ -36,14 +36,14 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Where a contact may have been, as weighted points on the object."""
+    """The posterior of a contact, as weighted points on the object."""
 
     points: FloatArray  #: ``(n, 3)`` metres, object frame.
     weights: FloatArray  #: ``(n,)``, not negative, any sum but zero.
     estimate: FloatArray  #: ``(3,)`` metres.
     modes: FloatArray  #: ``(k, 3)`` metres, separate likely positions, the likeliest first.
-    mode_weights: FloatArray  #: ``(k,)`` fraction of the posterior that each holds.
-    credible90: float  #: metres around the estimate that hold 90 % of the posterior.
+    mode_weights: FloatArray  #: ``(k,)`` fraction of the posterior at each position.
+    credible90: float  #: radius in m around the estimate that contains 90 % of the posterior.
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,12 +128,12 @@ class Heat:
 
 
 def bench_figure(parts: tuple[BenchPart, ...], base_from_gels: FloatArray, focus: FloatArray) -> Figure:
-    """Bench and object with the tool axis of every contact.
+    """Render bench and object with the tool axis of every contact.
 
     Args:
-        parts: bodies, the object among them.
+        parts: bodies, including the object.
         base_from_gels: ``(n, 4, 4)`` gel poses of the contacts.
-        focus: ``(3,)`` metres in base, the point in the centre.
+        focus: ``(3,)`` m in the base frame, the centre of the picture.
     """
     camera = look_at(focus, np.radians(-118.0), np.radians(22.0), _BENCH_WIDTH, 680, 1040)
     shot = Shot(parts, camera)
@@ -149,12 +149,12 @@ def bench_figure(parts: tuple[BenchPart, ...], base_from_gels: FloatArray, focus
 
 
 def contacts_figure(sides: Sides, object_from_gels: FloatArray, truths: FloatArray | None) -> Figure:
-    """The object from two sides with the tool axis of every contact.
+    """Render the object from two sides with the tool axis of every contact.
 
     Args:
         sides: views of the object.
         object_from_gels: ``(n, 4, 4)`` estimated gel poses.
-        truths: ``(n, 3)`` metres, object frame; None where unknown.
+        truths: ``(n, 3)`` m, true contacts in the object's frame; None if unknown.
     """
     figure, both = _row(2, 5.4)
     for axes, shot in zip(both, sides.shots, strict=True):
@@ -167,12 +167,12 @@ def contacts_figure(sides: Sides, object_from_gels: FloatArray, truths: FloatArr
 
 
 def posterior_strip(sides: Sides, posteriors: Mapping[int, Posterior], truths: FloatArray | None) -> Figure:
-    """The posterior after each contact, seen from both sides, one column a contact.
+    """Render the posterior after each contact from both sides, one column per contact.
 
     Args:
         sides: views of the object.
-        posteriors: by the number of the contact, from 1; at least one.
-        truths: ``(n, 3)`` metres of every contact, object frame; None where unknown.
+        posteriors: one or more posteriors by the number of the contact, from 1.
+        truths: ``(n, 3)`` m, true contacts in the object's frame; None if unknown.
     """
     figure = blank(2.0 * len(posteriors), 4.25)
     grid = np.asarray(figure.subplots(2, len(posteriors), squeeze=False))
@@ -186,7 +186,7 @@ def posterior_strip(sides: Sides, posteriors: Mapping[int, Posterior], truths: F
 
 
 def posterior_figure(sides: Sides, posterior: Posterior, truth: FloatArray | None) -> Figure:
-    """The posterior of one contact, large; ``truth`` is ``(3,)`` metres, or None where unknown."""
+    """Render the posterior of one contact, large; ``truth`` is ``(3,)`` metres, or None if unknown."""
     figure, both = _row(2, 5.4)
     heat = Heat(posterior)
     for axes, shot in zip(both, sides.shots, strict=True):

@@ -81,12 +81,12 @@ def outline_figure(picture: ByteArray, seen: FloatArray, fitted: FloatArray | No
 
 
 def resonances_figure(recorded: FloatArray, modelled: FloatArray, band: tuple[float, float]) -> Figure:
-    """Recorded peaks above, the model's modes at the estimated size below, over one axis of frequency.
+    """Plot recorded peaks above the model's modes at the estimated size, over one axis of frequency.
 
     Args:
         recorded: ``(p, 2)`` Hz and dB re 1 Pa/N.
-        modelled: ``(m, 2)`` likewise.
-        band: Hz, lowest and highest frequency that the strikes excited.
+        modelled: ``(m, 2)`` Hz and dB, as ``recorded``.
+        band: lowest and highest frequency in Hz that the strikes excited.
     """
     with styled():
         figure = blank(8.2, 3.6, "constrained")
@@ -127,11 +127,11 @@ def spectrogram_figure(frequencies: FloatArray, levels: Mapping[str, FloatArray]
 
 
 def touched_figure(surface: FloatArray, contacts: FloatArray, passed: Sequence[FloatArray]) -> Figure:
-    """The object from above and from the side, with its contacts and the probe lines without contact.
+    """Plot the object from above and from the side, with its contacts and the probe lines without contact.
 
     Args:
         surface: ``(n, 3)`` m, samples of the surface at the estimated size, upright.
-        contacts: ``(c, 3)`` m, the centre of each.
+        contacts: ``(c, 3)`` m, centres of the contacts.
         passed: ``(n, 3)`` m each, probe lines without contact.
     """
     with styled():

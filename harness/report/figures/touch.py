@@ -34,7 +34,7 @@ class TouchPictures:
 
 
 def touch_figure(shown: TouchPictures) -> Figure:
-    """Draw a row of the press, and under it a row of the live picture or of the rasteriser's press.
+    """Plot a row of the press, and under it a row of the live picture or of the rasteriser's press.
 
     Raises:
         ValueError: pictures of other shapes, or heights that are not finite.

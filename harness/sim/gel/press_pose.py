@@ -54,7 +54,7 @@ def contact_place(mesh: Mesh, asked: FloatArray) -> ContactPlace:
 
 
 def _contact_places(mesh: Mesh, points: FloatArray) -> tuple[ContactPlace, ...]:
-    """Find the places of a surface nearest to ``(n, 3)`` metres, each as ``contact_place`` gives it."""
+    """Find the contact points of a surface nearest to ``(n, 3)`` points in m, as ``contact_place``."""
     for point in points:
         if not np.isfinite(point).all():
             raise WrongUse(f"a contact at {point} is no place; give three finite numbers, x y z in metres")

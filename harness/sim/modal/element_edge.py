@@ -1,4 +1,4 @@
-"""How long the edges of elements are where nobody says so: by the waves of the modes asked for.
+"""Choose the default edge length of elements from the wavelengths of the requested modes.
 
 A plate that twists carries shear along its faces, opposite on both; at its narrow sides, which are free,
 that shear turns from one face to the other, and dies out inwards within about half of the wall. Where a

@@ -279,7 +279,7 @@ def snapped(mesh: QuadraticMesh, surface: Mesh) -> QuadraticMesh:
 
 
 def _straightened(mesh: QuadraticMesh) -> QuadraticMesh:
-    """Straighten cells that bending turned inside out: corners stay, middle nodes go back."""
+    """Straighten inverted cells: corners stay, middle nodes move to the midpoints of their edges."""
     corners = int(mesh.cells[:, :4].max()) + 1
     straight = _with_middles(mesh, mesh.nodes, corners)
     loose = np.zeros(len(mesh.nodes), dtype=np.bool_)

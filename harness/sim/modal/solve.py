@@ -1,8 +1,8 @@
-"""From ten-node tetrahedra to modes: free, or held at some of their nodes.
+"""Compute the modes of ten-node tetrahedra, free or clamped at some nodes.
 
 Grimes, Lewis and Simon, A Shifted Block Lanczos Algorithm for Solving Sparse Symmetric
 Generalized Eigenproblems, SIAM J. Matrix Analysis 15(1), 1994, with one shift below the
-spectrum, every block held orthogonal to all earlier ones and to the rigid motions, and the
+spectrum, every block kept orthogonal to all earlier ones and to the rigid motions, and the
 number of modes checked against the inertia of ``K - w^2 M`` at the limit.
 """
 

@@ -1,17 +1,17 @@
-"""Depth of a press from its picture, with what a contact itself does to the colour taken out.
+"""Estimate the depth of a press from its picture, corrected for the darkening by the contact.
 
-Two readings. The first, by the smooth model of the calibration, says roughly where the object is: its
-slopes lean, for it takes a contact's own dimming for slope. In the second that dimming is taken out there.
-Before both, the light of the moment is compared with the calibration's.
+There are two passes. The first, with the smooth model of the calibration, locates the contact roughly: its
+slopes are biased, since it interprets the darkening by the contact as slope. The second pass subtracts that
+darkening. Before both, the current light is compared with the calibration's.
 
 A real gel is darker by a dozen grey levels where something touches it, even at the apex of a ball, where it
 is as flat as untouched. The smooth model of ``harness.sim.optics.shading`` has no such term, so that a flat
-gel changes no colour, and leans its slopes instead. The table holds both: per bin it is
+gel changes no colour, and fits slopes instead. The table contains both: per bin it is
 
     table = slopes(normal, position) + offset(position),
 
-linear in both and decoupled by the terms of the position, so least squares over the bins that presses
-reached parts them.
+linear in both and decoupled by the terms of the position, so that least squares over the filled bins
+separates them.
 """
 
 from dataclasses import dataclass, replace

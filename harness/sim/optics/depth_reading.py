@@ -1,10 +1,10 @@
-"""A live picture read: the gel's surface, its error at every pixel, and its points in the frame of a tool.
+"""Read the gel's surface from a live picture, with its error at every pixel, and its points in a tool frame.
 
-Two errors of colour make a height wrong. The camera's noise differs from pixel to pixel and hardly adds up.
+Two colour errors cause height errors. The camera's noise is independent between pixels and hardly adds up.
 The calibration's misfit is the same wherever the gel has the same slope, so it adds up along every face;
-it is drawn as a random smooth function of the normal. Each draw becomes an error of slope by the linear
-part of the colour's inversion, and an error of height by the very least squares that gave the heights,
-on blocks of pixels, for errors of height are smooth. The spread of the draws is the standard deviation.
+it is sampled as a random smooth function of the normal. Each sample becomes an error of slope by the linear
+part of the colour's inversion, and an error of height by the same least squares as the heights,
+on blocks of pixels, since height errors are smooth. The standard deviation is that of the samples.
 """
 
 from dataclasses import dataclass, replace

@@ -219,7 +219,7 @@ def named(chosen: BoolArray) -> str:
 
 
 def _check_overlap(cells: IntArray, reversed_: BoolArray) -> None:
-    """Refuse oriented cells on the same side of a shared face; the reversed one of two is to blame."""
+    """Refuse oriented cells on the same side of a shared face; one of the two is reversed."""
     faces = cells[:, FACES].reshape(-1, 3)
     even = (faces < np.roll(faces, -1, axis=1)).sum(axis=1) == 2
     keys = np.column_stack([np.sort(faces, axis=1), even])
@@ -287,7 +287,7 @@ def _check_shared(cells: IntArray) -> None:
 
 
 def _check_curved(mesh: QuadraticMesh, said: list[str]) -> float:
-    """Return the least quality of a cell; report poor ones, refuse those that are inside out."""
+    """Return the minimum quality of the cells; report poor cells, refuse inverted ones."""
     straight = 6.0 * signed_volumes(mesh.nodes, mesh.cells)
     share = least_determinant(mesh) / straight
     if share.min() <= 0.0:

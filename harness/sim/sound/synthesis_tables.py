@@ -1,12 +1,12 @@
-"""A sum of decaying sines as products of two tables: underdamped modes after one impulse.
+"""Synthesize decaying sines as products of two tables: underdamped modes after one impulse.
 
-The kernels of ``harness.sim.sound.synthesis_kernels`` make the tables; here is which modes are in them, for
-how long, and in which order they are multiplied. A table costs as much as its modes are long. Where many
-last, a transform is shorter, of any number of them: within a stretch of ``L`` samples a mode times a bell of
-Gauss has a spectrum that is a bell again, also where its frequency is complex, so that some
-``2 REACH + 1`` bins hold it; they are added up for all modes, transformed, and divided by the first bell
+The kernels of ``harness.sim.sound.synthesis_kernels`` compute the tables; this module chooses the modes in
+them, their durations, and the order of the products. The cost of a table grows with the durations. For many
+long modes a Fourier transform costs less: within a block of ``L`` samples a mode times a Gaussian window has
+a Gaussian spectrum, also at a complex frequency, so that ``2 REACH + 1`` bins suffice. The bins are summed
+over all modes, transformed, and divided by the window
 (Greengard and Lee, Accelerating the Nonuniform Fast Fourier Transform, SIAM Review 46(3), 2004).
-Everything is in double precision; what is missing is bounded in closed form (``missing``).
+Everything is in double precision; the truncation error is bounded in closed form (``missing``).
 """
 
 from collections.abc import Mapping

@@ -101,13 +101,13 @@ class ArmMotion(Protocol):
 
 
 class _PlannedMove(Generic[Goal]):
-    """A move from rest to rest that is planned where it begins.
+    """A move from rest to rest that is planned at its start.
 
     Args:
         goal: joints in rad, or ``base_from_tcp``.
-        speed: rad/s of the leading joint, or m/s.
-        acceleration: rad/s^2 of the leading joint, or m/s^2.
-        duration: s; where above zero it decides instead.
+        speed: speed of the leading joint in rad/s, or of the tool in m/s.
+        acceleration: acceleration of the leading joint in rad/s^2, or of the tool in m/s^2.
+        duration: duration in s; above zero it replaces speed and acceleration.
     """
 
     def __init__(self, goal: Goal, speed: float, acceleration: float, duration: float = 0.0) -> None:
@@ -137,7 +137,7 @@ class _PlannedMove(Generic[Goal]):
 
     @abstractmethod
     def _place(self, body: ArmBody) -> Goal:
-        """Return where the arm is."""
+        """Return the position of the arm: joints, or the pose of the tool centre point."""
 
     @abstractmethod
     def _length(self, start: Goal) -> float:
@@ -145,11 +145,11 @@ class _PlannedMove(Generic[Goal]):
 
     @abstractmethod
     def _put(self, body: ArmBody, start: Goal, share: float) -> None:
-        """Command the body at a share of the move."""
+        """Command the body to a fraction of the move."""
 
 
 class MoveJoints(_PlannedMove[Six]):
-    """``movej``: all joints in proportion to the one that turns most."""
+    """``movej``: all joints move in proportion to the joint with the longest motion."""
 
     def _place(self, body: ArmBody) -> Six:
         return body.joints
@@ -163,7 +163,7 @@ class MoveJoints(_PlannedMove[Six]):
 
 
 class MoveLine(_PlannedMove[Matrix]):
-    """``movel``: the tool centre point in a straight line, turning evenly."""
+    """``movel``: the tool centre point moves in a straight line and rotates uniformly."""
 
     _turn: Vector = (0.0, 0.0, 0.0)
 

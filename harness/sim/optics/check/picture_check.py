@@ -490,7 +490,7 @@ def _require_press(change: FloatArray, calibration: TactileCalibration, block: i
 
 
 def _require_light(seen: FloatArray, known: FloatArray) -> None:
-    """Refuse a picture that is all but black next to its calibration's resting one."""
+    """Refuse a picture that is almost black compared with its calibration's resting picture."""
     left = float(seen.sum() / max(float(known.sum()), 1.0))
     if left < _NO_LIGHT:
         raise PictureRefused(
@@ -519,7 +519,7 @@ def require_whole(image: ByteArray, known: ByteArray) -> None:
 
 
 def _require_unclipped(image: ByteArray, known: ByteArray) -> None:
-    """Refuse a picture of which far more is clipped than of its calibration's background."""
+    """Refuse a picture with far more clipped pixels than its calibration's background."""
     clipped = _clipped(image) - _clipped(known)
     if clipped > _MOST_CLIPPED:
         raise PictureRefused(
@@ -529,7 +529,7 @@ def _require_unclipped(image: ByteArray, known: ByteArray) -> None:
 
 
 def _require_quiet(image: ByteArray, rest: ByteArray) -> None:
-    """Refuse colours that jump from pixel to pixel as a bad cable's do, or a camera's without light."""
+    """Refuse colours that change randomly between pixels, e.g. by a bad cable or a camera without light."""
     jump = float(np.median(np.abs(np.diff(image[::8].astype(np.int16) - rest[::8], axis=1))))
     if jump > _MOST_NOISE:
         raise PictureRefused(
@@ -539,7 +539,7 @@ def _require_quiet(image: ByteArray, rest: ByteArray) -> None:
 
 
 def _require_lit(seen: FloatArray, rest: FloatArray) -> None:
-    """Refuse a picture of which a part is darker or brighter in every channel than a press makes a gel."""
+    """Refuse a picture with a region that is darker or brighter in every channel than any press."""
     ratio = (seen + 1.0) / (rest + 1.0)
     dark = float((ratio.max(axis=2) < _DARKEST).mean())
     bright = float((ratio.min(axis=2) > 1.0 / _DARKEST).mean())

@@ -1,4 +1,4 @@
-"""Household shapes drawn at random: of what a regression and networks learn, and on what they are tested.
+"""Random shapes of household categories, the training and test data of a regression and of networks.
 
 Every hexahedron is cut along the diagonal from its first corner to its last (Kuhn, Some combinatorial lemmas
 in topology, IBM Journal 4(5), 1960), so that blocks which share nodes in the same order fit each other.
