@@ -267,7 +267,7 @@ def chosen(folder: Path | None, wanted: PressRequest) -> None:
     if len(given) != 1:
         raise WrongUse(
             f"{' and '.join(given) or 'nothing'} given; give FOLDER (pictures, or a run that the arm made), "
-            "or --station NAME to press a ball with that bench's arm, or --resume RUN to go on with one"
+            "or --station NAME to press a ball with that bench's arm, or --resume RUN to resume a run"
         )
     if wanted.station is None:
         wanted.require_none()

@@ -260,7 +260,7 @@ def look_methods(bench: ViewBench, of: ObjectFile, work: RenderingWork) -> list[
         ]
     )
     return [
-        RenderingMethod("white alone", "other", (), lambda: white, "costs nothing"),
+        RenderingMethod("white alone", "other", (), lambda: white, "needs no training"),
         RenderingMethod(
             "one field, samples evenly (1.0)",
             "1.0 here",

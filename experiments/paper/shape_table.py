@@ -250,9 +250,8 @@ class ShapeTable(ShapeMeasurement):
             truth = true_surface(run, read_truth(run.recording))
             if truth is None:
                 raise DataRefused(
-                    f"no true surface is beside {run.recording.folder.name}: no instrument read anything in "
-                    "this run, or its .truth.npz was taken away; take the run away too, and it is performed "
-                    "again"
+                    f"no true surface is next to {run.recording.folder.name}: the run has no readings, or "
+                    "its .truth.npz was removed; remove the run too, and it is performed again"
                 )
             evidence = evidence_of(run, run.recording.steps())
             presses = run.scene.section(ShapeRun).presses

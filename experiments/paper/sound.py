@@ -219,7 +219,7 @@ def sound_methods(bench: StrikeBench, work: RenderingWork) -> list[RenderingMeth
         for name, column in _PROFILES
     ]
     return [
-        RenderingMethod("silence", "other", (), lambda: MadeMethod(lambda _: silence), "costs nothing"),
+        RenderingMethod("silence", "other", (), lambda: MadeMethod(lambda _: silence), "needs no training"),
         RenderingMethod(
             "spectrogram AudioNet (1.0)",
             "1.0 here",

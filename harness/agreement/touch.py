@@ -83,7 +83,7 @@ class SurfaceNoise:
 
 
 def compare_touch(subject: Subject, source: Source, contacts: Sequence[PressedContact]) -> SenseResiduals:
-    """Compare every contact's surface of the gel with a model's, by the network or the reference."""
+    """Compare the gel's surface at every contact with a model's, by the network or the reference."""
     errors, noise = subject.run.station.errors, SurfaceNoise()
     residuals, notes = [], refusal_notes(contacts)
     for contact in contacts:

@@ -110,7 +110,7 @@ def read_networks(folder: Path, names: Iterable[str], train: str) -> dict[str, b
             try:
                 json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
             except (OSError, ValueError) as error:
-                raise DataRefused(f"{path} has no card beside it; train it again: {train}") from error
+                raise DataRefused(f"{path} has no card next to it; train it again: {train}") from error
             found[path.stem] = path.read_bytes()
     if not found:
         files = ", ".join(f"{name}.onnx" for name in names)

@@ -138,7 +138,7 @@ def read_stiffness(
     idle = [f"--{name.replace('_', '-')}" for name, value in named.items() if value is not None]
     idle += [text for text in levels if text.startswith(FORCE_LEVEL)]
     if idle and not force:
-        raise WrongUse(f"{idle[0]} is of a force, and none is asked for; add --force, or leave it out")
+        raise WrongUse(f"{idle[0]} needs a force; add --force, or omit {idle[0]}")
     if (modulus is None) != (share is None):
         raise WrongUse(
             "a modulus and how well it is known go together; say both, as --gel-modulus 0.2MPa "

@@ -111,7 +111,7 @@ def measure_sample(cell: RunCell, run: Solver, setting: Setting) -> Sample:
     with _uncollected():
         solved = run.solve(setting)
     if solved.error is None:
-        raise FitRefused(solved.refusal or f"{cell.name} has no truth to score it by")
+        raise FitRefused(solved.refusal or f"{cell.name} has no true values to compare with")
     numbers = shared, solved.cpu, solved.wall, run.work(setting)
     return Sample(cell.name, run.object, solved.error, solved.radius, *numbers)
 

@@ -31,9 +31,9 @@ def require_self_test(network: Network, test: SelfTest) -> float:
     worst = max(_gap(outputs[kept.name].ravel(), kept) for kept in test.outputs if kept.name in outputs)
     if not worst <= test.tolerance:
         raise DataRefused(
-            f"{network.name} differs from what it gave when it was made by {worst:.2g} of the greatest "
-            f"number, where {test.tolerance:g} is allowed: another onnxruntime that computes otherwise, or "
-            "another object's network; build the object again"
+            f"the outputs of {network.name} differ from those at build time by {worst:.2g} of the largest; "
+            f"{test.tolerance:g} is allowed: another onnxruntime with other results, or another object's "
+            "network; build the object again"
         )
     return worst
 

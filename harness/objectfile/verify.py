@@ -184,7 +184,7 @@ def look_at_domain(of: Either, run: Opened) -> str:
             if bad:
                 raise DataRefused(
                     f"{network.name} gives {bad} of {values.size} numbers {tensor.name!r} that are not "
-                    "finite within the domain it claims; train it again, or claim less"
+                    "finite within its stated domain; train it again, or state a smaller domain"
                 )
     return f"finite at {2 * _INSIDE} places of the domain, half of them at its edge"
 

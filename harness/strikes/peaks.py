@@ -62,8 +62,8 @@ def analyse(strikes: Sequence[Strike], settings: Analysis | None = None) -> Soun
     Object and microphone are at rest.
 
     Returns:
-        No peaks where fewer than two strikes count: one alone cannot be told from the microphone's
-        response.
+        No peaks if fewer than two strikes are usable: a single strike does not separate the object from
+        the microphone's response.
 
     Raises:
         DataRefused: rates differ, or a signal is not finite.

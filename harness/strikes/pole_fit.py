@@ -279,7 +279,7 @@ def new_poles(
 def _spread_out(
     lines: SpectralLines, fit: PoleFit, power: FloatArray, tops: AnyArray
 ) -> list[tuple[float, float]]:
-    """Select the peaks that are no side effect of a stronger peak: of its tail, or of a poorly fitted mode."""
+    """Select the peaks that no stronger peak can explain, by its tail or as a poorly fitted mode."""
     chosen: list[tuple[float, float]] = []
     reach: list[tuple[float, float]] = []
     known, widths = fit.omegas / (2.0 * np.pi), fit.decays / (2.0 * np.pi)

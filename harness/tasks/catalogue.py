@@ -51,7 +51,7 @@ class CheckedCatalogue(Result):
     materials: Mapping[str, int]  #: number of objects by material.
     notes: tuple[str, ...] = field(metadata=JSON_ONLY)
     excluded: tuple[ExcludedRow, ...]
-    intake: tuple[IntakeFinding, ...]  #: empty if no mesh was opened.
+    intake: tuple[IntakeFinding, ...]  #: findings of the intake; empty if no mesh was opened.
 
     @property
     def buildable(self) -> int:
@@ -59,7 +59,7 @@ class CheckedCatalogue(Result):
         return sum(each.reason is None for each in self.intake) if self.intake else self.with_mesh
 
     def summary(self) -> tuple[str, ...]:
-        """State what to look at, and how many objects are ready."""
+        """List the findings, and count the objects that are ready."""
         counts = Counter(each.verdict for each in self.intake)
         verdicts = ", ".join(
             f"{counts[name]} {name}" for name in ("ready", "look", "excluded") if counts[name]
@@ -89,21 +89,21 @@ class BuiltCatalogue(Result):
     """The outcome of a build."""
 
     folder: Path
-    objects: int  #: of the catalogue that have a mesh.
-    standing: int  #: objects that were built before.
+    objects: int  #: number of objects of the catalogue that have a mesh.
+    standing: int  #: number of objects that were built before.
     built: int
-    failed: tuple[FailedObject, ...]  #: in this build, or before and not tried again.
+    failed: tuple[FailedObject, ...]  #: objects that failed in this build, or before without another try.
     excluded: tuple[ExcludedRow, ...] = field(metadata=JSON_ONLY)
     stages_made: Mapping[str, int]  #: number of objects by sense.
     seconds: float
-    tried: int = field(metadata=HIDDEN)  #: objects of this build.
+    tried: int = field(metadata=HIDDEN)  #: number of objects that this build tried.
     notes: tuple[str, ...] = field(metadata=HIDDEN)
 
     def summary(self) -> tuple[str, ...]:
-        """State how many objects are built."""
+        """Count the built objects."""
         if not self.tried:
-            return (f"nothing to do: {self.standing} of {self.objects} objects stand in {self.folder}",)
-        return (f"{self.built} of {self.objects} objects built, {self.standing} stood already",)
+            return (f"nothing to do: {self.standing} of {self.objects} objects are already in {self.folder}",)
+        return (f"{self.built} of {self.objects} objects built, {self.standing} were built before",)
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ Rows = tuple[Catalogue, list[tuple[CatalogueRow, str]], tuple[ExcludedRow, ...]]
 
 
 def _read(catalogue: Path, meshes: Path | None, materials: Sequence[str]) -> Rows:
-    """Return the catalogue of the chosen materials, its rows with their meshes, and the excluded rows."""
+    """Read the catalogue of the chosen materials, its rows with their meshes, and the excluded rows."""
     chosen = of_materials(read_catalogue(catalogue), list(materials))
     rows, without = with_meshes(chosen.rows, meshes or catalogue.parent)
     return chosen, rows, (*chosen.excluded, *without)
@@ -168,7 +168,7 @@ def check_catalogue(
     rows_only: bool,
     report: Report,
 ) -> CheckedCatalogue:
-    """Take in every object of a catalogue and report its units, size, openings, walls and mass.
+    """Check every object of a catalogue and report its units, size, openings, walls and mass.
 
     Raises:
         WrongUse: no such catalogue, or an unknown material.
@@ -207,7 +207,7 @@ def build_catalogue(
 ) -> BuiltCatalogue:
     """Build every object of a catalogue into an ObjectFile; a build that was stopped is resumed.
 
-    The arguments are the options of ``touchstone catalogue build``. ``progress`` is entered with the number
+    The arguments are the options of ``touchstone catalogue build``. ``progress`` is called with the number
     of objects and yields their counter, ``warn`` receives failures.
 
     Raises:
@@ -293,7 +293,7 @@ def catalogue_status(folder: Path) -> CatalogueStatus:
 
 
 def draw_catalogue(folder: Path, out: Path | None = None) -> CataloguePage:
-    """Write one page of all objects of a build, with a picture of each.
+    """Write a page of all objects of a build, with a picture of each.
 
     Raises:
         WrongUse: nothing was built into the folder.

@@ -1,4 +1,4 @@
-"""What an experiment's accuracy costs, and its errors over objects and methods, on the mocked bench."""
+"""Measure an experiment's errors and seconds over objects, methods and settings, on the mocked bench."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -47,7 +47,7 @@ def _levels(
     where: Sequence[str],
     tabled: bool = False,
 ) -> dict[str, list[str]]:
-    """Return the levels of every condition to measure; the usual ones of those that are not named.
+    """Return the levels of every condition to measure, by default the usual ones.
 
     Raises:
         WrongUse: a condition that the experiment does not have, or an unknown level.
@@ -80,13 +80,13 @@ class MeasuredCost(Result):
     made: str = field(metadata=JSON_ONLY)
     machine: Mapping[str, str | int] = field(metadata=JSON_ONLY)
     code: Mapping[str, str] = field(metadata=JSON_ONLY)
-    conditions: tuple[JsonObject, ...] = field(metadata=JSON_ONLY)  #: with the settings of each.
+    conditions: tuple[JsonObject, ...] = field(metadata=JSON_ONLY)  #: each with its settings.
     curve: Path  #: file of the curve.
     report: Path  #: HTML page.
     found: Curve = field(metadata=HIDDEN)
 
     def tables(self) -> Iterable[TextTable]:
-        """Yield the front of each condition."""
+        """Yield a table of the Pareto front of each condition."""
         for condition in self.found.conditions():
             points = self.found.where(condition)
             named = ", ".join(f"{name} {value}" for name, value in condition.items())
@@ -127,8 +127,8 @@ def measure_cost(
 ) -> MeasuredCost:
     """Measure the error and the seconds of an experiment at every setting of its knobs.
 
-    Every run is performed once on the mocked bench and answered at every setting. The curve is kept for this
-    machine and this code, for budgets of later runs.
+    Every run is performed once on the mocked bench and answered at every setting. The curve is stored for
+    this machine and this code, and used by budgets of later runs.
 
     The arguments are the options of ``touchstone cost``; ``levels`` are of conditions by name, ``progress``
     and ``warn`` receive what it reports.
@@ -259,7 +259,7 @@ class MeasuredTable(Result):
                 yield title, ["method", *found], [line for line in lines if any(line[1:])]
 
     def summary(self) -> tuple[str, ...]:
-        """State the errors of the paper."""
+        """State the errors in the paper."""
         named = "; ".join(
             f"{name}: {', '.join(f'{v:g}' for v in values)}" for name, values in self.published.items()
         )

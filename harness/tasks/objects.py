@@ -46,13 +46,13 @@ def load_object(folder: str | Path) -> ObjectFile | PublishedObject:
 
 @dataclass(frozen=True, eq=False)
 class ObjectInfo(Result):
-    """The content of an ``object.json``."""
+    """An ObjectFile, as its ``object.json`` describes it."""
 
     folder: Path = field(metadata=JSON_ONLY)
     description: Description | PublishedDescription = field(metadata=HIDDEN)
 
     def as_json(self) -> dict[str, JsonValue]:
-        """Return the folder, and the content of the file."""
+        """Return the folder and the content of the file as JSON values."""
         return {"folder": str(self.folder), **self.description.model_dump(mode="json", by_alias=True)}
 
     def summary(self) -> tuple[str, ...]:
@@ -61,7 +61,7 @@ class ObjectInfo(Result):
 
 
 def describe_object(of: Description | PublishedDescription) -> list[str]:
-    """Describe the object, its senses and its networks, a line each."""
+    """Describe an object, its senses and its networks, one per line."""
     if isinstance(of, PublishedDescription):
         return _published_lines(of)
     mesh, material, audio, touch, vision = of.mesh, of.material, of.audio, of.touch, of.vision

@@ -1,4 +1,4 @@
-"""Results of commands on ObjectFiles with networks that others published."""
+"""Results of commands on ObjectFiles with published networks of third parties."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,10 +25,10 @@ class ImportedObject(Result):
     folder: Path
     object: str = field(metadata=JSON_ONLY)  #: name of the object.
     format: str = field(metadata=JSON_ONLY)
-    sha256: str | None = field(metadata=JSON_ONLY)  #: of the published file.
+    sha256: str | None = field(metadata=JSON_ONLY)  #: SHA-256 of the published file.
     licence: str = field(metadata=JSON_ONLY)
-    networks: Mapping[str, NetworkFile] = field(metadata=JSON_ONLY)  #: by sense.
-    missing: tuple[str, ...] = field(metadata=JSON_ONLY)  #: what the file did not hold, a sentence each.
+    networks: Mapping[str, NetworkFile] = field(metadata=JSON_ONLY)  #: networks by sense.
+    missing: tuple[str, ...] = field(metadata=JSON_ONLY)  #: missing contents of the file, one sentence each.
     dropped: Mapping[str, int] = field(metadata=JSON_ONLY)  #: number of unused weights by layer.
     lines: tuple[str, ...] = field(metadata=HIDDEN)
 
@@ -49,7 +49,7 @@ class ImportedObject(Result):
         )
 
     def summary(self) -> tuple[str, ...]:
-        """List the source, and what the file did not hold."""
+        """List the source, and the missing contents of the file."""
         return self.lines
 
 
@@ -57,11 +57,11 @@ class ImportedObject(Result):
 class RenderedQueries(Result):
     """The answers to ObjectFolder's query files."""
 
-    folder: Path  #: of the ObjectFile.
+    folder: Path  #: folder of the ObjectFile.
     object: str  #: name of the object.
     objectfolder_compat: bool
-    files: Mapping[str, tuple[Path, ...]] = field(metadata=JSON_ONLY)  #: written, by sense.
-    full_scale: float | None  #: of the sounds; None if each has its own.
+    files: Mapping[str, tuple[Path, ...]] = field(metadata=JSON_ONLY)  #: written files by sense.
+    full_scale: float | None  #: full scale of the sounds; None if each has its own.
     notes: tuple[str, ...] = field(metadata=JSON_ONLY)
     seconds: Mapping[str, float]
 
@@ -72,7 +72,7 @@ class RenderedQueries(Result):
         return cls(folder, name, compat, files, found.full_scale, tuple(found.notes), found.seconds)
 
     def summary(self) -> tuple[str, ...]:
-        """State the files of each sense."""
+        """List the files of each sense."""
         return tuple(
             f"{sense}: {len(paths)} files, {paths[0]} and so on" for sense, paths in self.files.items()
         )

@@ -1,4 +1,4 @@
-"""Runs of experiments: made, resumed, answered again and compared with models of their objects."""
+"""Perform, resume and replay runs of experiments, and compare them with models of their objects."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -49,12 +49,12 @@ from harness.tasks.scenes import SceneOptions, resolve
 class RunResult(Result):
     """The answer of a run; its JSON is that of ``result.json``."""
 
-    folder: Path = field(metadata=JSON_ONLY)  #: that holds ``result.json``.
+    folder: Path = field(metadata=JSON_ONLY)  #: folder of ``result.json``.
     report: Path  #: HTML page.
-    result: JsonObject = field(metadata=HIDDEN)  #: as ``result.json`` has it.
+    result: JsonObject = field(metadata=HIDDEN)  #: content of ``result.json``.
 
     def as_json(self) -> dict[str, JsonValue]:
-        """Return the content of ``result.json``."""
+        """Return the content of ``result.json`` as JSON values."""
         return dict(self.result)
 
 
@@ -66,7 +66,7 @@ class ComparedRun(Result):
     agreement: Agreement = field(metadata=HIDDEN)
 
     def as_json(self) -> dict[str, JsonValue]:
-        """Return the folder, and the keys of the agreement."""
+        """Return the folder and the keys of the agreement as JSON values."""
         return {"schema": self.schema, "recording": str(self.recording), **self.agreement.as_json()}
 
     def summary(self) -> tuple[str, ...]:
@@ -84,28 +84,28 @@ class PlannedRun:
     """A run whose folder exists, before anything moves."""
 
     experiment: AnyExperiment
-    files: RunFiles  #: its folder.
-    accuracy: Accuracy  #: of the answer, if no target chooses it.
+    files: RunFiles  #: folder of the run.
+    accuracy: Accuracy  #: levels of the answer, if no target chooses them.
     target: Target | None  #: budget or error of the answer; None if levels are given.
 
 
 class RunStopped(TouchstoneError):
-    """Ctrl-C ended a run after a step; what was recorded is kept in ``folder``."""
+    """Ctrl-C ended a run after a step; ``folder`` has the recorded steps."""
 
     exit_code = 130
 
     @classmethod
     def kind(cls) -> str:
-        """Return the kind of every end by Ctrl-C."""
+        """Return the kind of this error in JSON output."""
         return "interrupted"
 
     def __init__(self, last_step: str, folder: Path, resume_command: str) -> None:
         self.folder = folder
-        super().__init__(f"stopped after {last_step}; go on with `{resume_command}`")
+        super().__init__(f"stopped after {last_step}; resume with `{resume_command}`")
 
 
 class RunWatcher:
-    """Receives what a run reports while it is made; subclasses override what they show."""
+    """Receives the reports of a run; subclasses override the methods to show them."""
 
     ask: Ask | None = None  #: shows the operator what to do by hand; None if there is no operator.
 
@@ -119,7 +119,7 @@ class RunWatcher:
         """Receive a warning."""
 
     def track_steps(self, _done: int, _total: int, _noun: str) -> AbstractContextManager[Progress]:
-        """Return a context of the object that receives the beginning and the end of each step."""
+        """Return a context of a progress, which receives the start and the end of each step."""
         return nullcontext(Quiet())
 
     def show_answer(self, lines: Sequence[str]) -> None:
@@ -142,27 +142,27 @@ def run(
 ) -> RunResult:
     """Plan a run, rehearse it in the twin, perform it on a bench, answer it and draw its report.
 
-    Ctrl-C once ends the run after the step; twice stops the arm.
+    The first Ctrl-C ends the run after the step; the second one stops the arm.
 
     Args:
-        experiment: name; ``"contact-localization"``, or that of the resumed run, if None.
+        experiment: name of the experiment; that of the resumed run or ``"contact-localization"`` if None.
         scene: name or file of a scene, or ``SceneOptions``, which describe an object and change settings.
         station: name or file of the bench; ``"mock"`` if None.
-        levels: of knobs, e.g. ``"localization.method=particle"``.
-        budget: time in s for the estimate: the best levels that keep it are used.
-        error: largest error in m in 19 of 20 runs: the cheapest levels that keep it are used, or the run
-            ends when its own estimate states it.
-        seed: of all random numbers; that of the scene if None.
+        levels: levels of knobs, e.g. ``"localization.method=particle"``.
+        budget: time limit in s of the estimate; the most accurate levels within it are used.
+        error: maximum error in m at 95 % confidence; the cheapest levels that meet it are used, or the run
+            ends when its own estimate meets it.
+        seed: random seed; that of the scene if None.
         gap: reality gap of a mocked bench; that of the experiment or the station if None.
         bench: form of a mocked bench, ``"in-process"`` or ``"wires"``; in process if None.
-        out: folder of the run; a dated one under ``runs/`` if None.
+        out: folder of the run; a dated folder in ``runs/`` if None.
         resume: folder of a run to resume at its first missing step; the options that plan a run must be None.
         watcher: receives progress and the answer, and shows the operator what to do by hand.
 
     Raises:
         RunStopped: Ctrl-C ended the run early.
         TouchstoneError: the scene, bench, level or plan is refused and nothing has moved; or the bench or the
-            answer failed, and what was recorded is kept.
+            answer failed, and the recorded steps are kept.
     """
     watcher = watcher or RunWatcher()
     if not isinstance(scene, SceneOptions):
@@ -211,7 +211,7 @@ def _open_to_resume(
     target: Target | None,
     watcher: RunWatcher,
 ) -> PlannedRun:
-    """Open a run to resume; its own target is kept if neither levels nor another target are given."""
+    """Open a run to resume; it keeps its target if neither levels nor another target are given."""
     planning = {**given, "range": given["sizes"], "set": given["assignments"] or None}
     own = ("sizes", "assignments", "keys")  # not names of options
     options = [
@@ -255,19 +255,19 @@ def perform_run(
     accuracy: Accuracy | None = None,
     conclude: Callable[[Performed], None] = lambda _: None,
 ) -> Performed:
-    """Perform what is left of a run; no bench is opened if nothing is.
+    """Perform the missing steps of a run; no bench is opened if none is missing.
 
     Args:
         procedure: experiment or calibration of the run.
         files: folder of the run.
         resume_command: command that resumes the run, for messages.
         watcher: receives the progress.
-        accuracy: of the answer, to take in readings during the run; None if a later choice decides it.
+        accuracy: levels of the answer, to process readings during the run; None if they are chosen later.
         conclude: receives the outcome while the bench is still open.
 
     Raises:
         RunStopped: Ctrl-C ended the run early.
-        TouchstoneError: the bench failed; what was recorded is kept.
+        TouchstoneError: the bench failed; the recorded steps are kept.
     """
     recording = files.recording
     total = steps_planned(procedure, recording)
@@ -287,7 +287,7 @@ def perform_run(
                 conclude=conclude,
             )
     except TouchstoneError:
-        watcher.warn(f"what was recorded is kept; go on with `{resume_command}`")
+        watcher.warn(f"the recorded steps are kept; resume with `{resume_command}`")
         raise
     if not done.complete:
         raise RunStopped(f"{procedure.step} {recording.committed}", recording.folder, resume_command)
@@ -295,7 +295,7 @@ def perform_run(
 
 
 def _perform_and_answer(run: PlannedRun, watcher: RunWatcher) -> RunResult:
-    """Perform what is left of a run and answer it.
+    """Perform the missing steps of a run and answer it.
 
     Without a target the answer is published while the bench is still open, as closing one takes time. A run
     that was performed before, or whose target chooses the levels, is answered once the bench is closed.
@@ -321,7 +321,7 @@ def _perform_and_answer(run: PlannedRun, watcher: RunWatcher) -> RunResult:
         front = front_for(experiment, run.files.scene, recording.committed)
         for doubt in doubts(experiment, front, run.target):
             watcher.warn(doubt)
-        watcher.report("estimating as asked, then at the finest levels")
+        watcher.report("estimating at the chosen levels, then at the finest levels")
         cost = answer_as_asked(experiment, run.files, front, run.target)
         for sentence in sentences(experiment, cost):
             watcher.report(sentence)
@@ -357,14 +357,14 @@ def replay(
 
     Args:
         run: its folder.
-        levels: of knobs that differ from those of the run's own result, e.g. ``"localization.rounds=0"``.
+        levels: levels that differ from those of the run's result, e.g. ``"localization.rounds=0"``.
         out: folder of result and report; that of the run with ``-replay`` appended if None.
-        wav: folder to write the force and sound of every strike to, as WAV files.
+        wav: folder for WAV files of the force and sound of every strike; None to write none.
         watcher: receives warnings and the answer.
 
     Raises:
         WrongUse: no run, a calibration's run, or an unknown knob.
-        RecordingDamaged: a step or a file of it is not what was recorded.
+        RecordingDamaged: a step or a file of the run is damaged.
         FitRefused: nothing explains the readings.
     """
     watcher, folder = watcher or RunWatcher(), Path(run)
@@ -372,12 +372,12 @@ def replay(
     kind = experiment_of(files.recording)
     if wav is not None:
         written = export_wav(files.recording, wav)
-        watcher.warn(f"{len(written)} WAV files in {wav}; counts, rates and times in wav.json beside them")
+        watcher.warn(f"{len(written)} WAV files in {wav}; wav.json next to them has counts, rates and times")
     try:
         own = levels_of_result(kind, folder) or files.network_levels
     except RecordingDamaged as error:
         own = files.network_levels
-        watcher.warn(f"{error}; the default levels are taken")
+        watcher.warn(f"{error}; using the default levels")
     accuracy = chosen_levels(kind.knobs, levels, own)
     target, publish = out or folder.with_name(f"{folder.name}-replay"), partial(_publish, kind, watcher)
     with hold_folder(target):
@@ -391,11 +391,11 @@ def compare(run: str | Path, objectfile: str | Path | None = None, reference: bo
     Args:
         run: its folder.
         objectfile: ObjectFile of another object to compare with: its folder or its name; None for the run's.
-        reference: whether the reference simulation is compared too if networks stand for it.
+        reference: whether the reference simulation is compared too if networks replace it.
 
     Raises:
         WrongUse: no run, a calibration's run, or no ObjectFile.
-        RecordingDamaged: a step or a file of it is not what was recorded.
+        RecordingDamaged: a step or a file of the run is damaged.
     """
     folder = Path(run)
     files = RunFiles(Recording(folder))
@@ -419,7 +419,7 @@ def answer(run: str | Path, levels: Sequence[str] = ()) -> dict[str, Any]:
 
     Raises:
         WrongUse: no run, a calibration's run, or an unknown dial.
-        RecordingDamaged: a step or a file of it is not what was recorded.
+        RecordingDamaged: a step or a file of the run is damaged.
         FitRefused: nothing explains the readings.
     """
     files = RunFiles(Recording(Path(run)))

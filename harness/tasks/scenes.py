@@ -13,9 +13,9 @@ from harness.bench.scene import SceneFile, Section, load_scene, scene_from_json,
 
 @dataclass(frozen=True)
 class SceneOptions:
-    """A scene: a file, or an object instead, and settings that differ; None for those left out."""
+    """Options of a scene: a file or an object, and changed settings; None for unchanged ones."""
 
-    scene: Path | None = None  #: its file or name.
+    scene: Path | None = None  #: file or name of the object.
     object: str | None = None  #: a mesh, a built-in object or an ObjectFile instead.
     material: str | None = None  #: of that object.
     units: str | None = None  #: of that object.

@@ -1,4 +1,4 @@
-"""The picture of a press by the camera behind a gel: of a mesh, of a height map or by an ObjectFile."""
+"""Render the tactile image of a press on a mesh, on a height map or on an ObjectFile."""
 
 import math
 import time
@@ -43,23 +43,23 @@ from harness.tasks.press_force import FORCE_LEVEL, PressForce, force_of_press, f
 
 @dataclass(frozen=True)
 class TouchFlags:
-    """Reasons not to trust a picture of a press, and how much of it they concern."""
+    """Reasons not to trust a picture of a press, with the affected fractions."""
 
     no_contact: bool
     touches_border: bool  #: the contact reaches the edge of the picture.
     fills_window: bool  #: the contact is all of the picture that has heights.
-    missing_heights: int  #: pixels without a height.
-    saturated_values: int  #: clipped to black or white.
-    out_of_domain_share: float | None  #: of the pixels, steeper than any press of the calibration.
-    filled_bins_share: float | None  #: of the pixels whose slope the calibration measured.
-    shadow_out_of_table_share: float | None  #: of the rim of the contact; None without shadows.
+    missing_heights: int  #: number of pixels without a height.
+    saturated_values: int  #: number of values clipped to black or white.
+    out_of_domain_share: float | None  #: pixels steeper than any press of the calibration.
+    filled_bins_share: float | None  #: fraction of the pixels whose slope the calibration measured.
+    shadow_out_of_table_share: float | None  #: fraction of the contact's rim; None without shadows.
 
 
 @dataclass(frozen=True)
 class MeshDifference:
     """Difference of an ObjectFile's press from the rasteriser's press of its mesh."""
 
-    rms_m: float  #: of the gel's surface.
+    rms_m: float  #: rms difference of the gel's surface.
     p99_m: float
     most_m: float
     image_rms_grey: float
@@ -71,12 +71,12 @@ class MeshDifference:
 class TouchError:
     """Errors of a picture of a press."""
 
-    held_out_db: float | None  #: of the calibration, on held-out presses; None if not stated.
+    held_out_db: float | None  #: PSNR of the calibration on held-out presses; None if not stated.
     held_out_table_db: float | None
-    residual_rms_grey: float  #: of the calibration; NaN if not stated.
-    colours_residual_rms_grey: float  #: the same.
+    residual_rms_grey: float  #: rms residual of the calibration; NaN if not stated.
+    colours_residual_rms_grey: float  #: rms residual of the calibration's colours; NaN if not stated.
     table_colour_grey: float | None
-    maps_measured: Mapping[str, float] | None  #: of an ObjectFile's network; None if it has no part in this.
+    maps_measured: Mapping[str, float] | None  #: errors of an ObjectFile's network; None without one.
     from_mesh: MeshDifference | None  #: None unless an ObjectFile's network gave the surface.
 
 
@@ -90,7 +90,7 @@ class PictureAgreement:
 
     @property
     def texts(self) -> tuple[str, str]:
-        """Return the value over the frame and the one over the contact."""
+        """Format the value over the frame and the value over the contact."""
         frame, contact = (
             "no pixel" if value is None else f"{value:.2f} dB" if math.isfinite(value) else "identical"
             for value in (self.psnr_db, self.psnr_contact_db)
@@ -111,7 +111,7 @@ class LivePress:
 class RenderedTouch(Result):
     """The picture of a press, and the press."""
 
-    folder: Path | None  #: of the ObjectFile that gave the gel's surface; None otherwise.
+    folder: Path | None  #: folder of the ObjectFile that gave the gel's surface; None without one.
     object: str | None  #: name of that ObjectFile's object.
     level: str | None  #: source of that surface: ``"codes"`` or ``"reference"``.
     image: Path | None
@@ -123,16 +123,16 @@ class RenderedTouch(Result):
     calibration: UsedCalibration = field(metadata=JSON_ONLY)
     rows: int
     columns: int
-    pitch_m: float  #: of a pixel.
-    depth_m: float | None = field(metadata=JSON_ONLY)  #: None for a height map, as pose and place.
+    pitch_m: float  #: size of a pixel.
+    depth_m: float | None = field(metadata=JSON_ONLY)  #: None for a height map, as are pose and point.
     tilt_rad: float | None = field(metadata=JSON_ONLY)
     azimuth_rad: float | None = field(metadata=JSON_ONLY)
     yaw_rad: float | None = field(metadata=JSON_ONLY)
-    point_m: FloatArray | None = field(metadata=JSON_ONLY)  #: ``(3,)`` in the object's frame.
-    normal: FloatArray | None = field(metadata=JSON_ONLY)  #: ``(3,)`` outward.
+    point_m: FloatArray | None = field(metadata=JSON_ONLY)  #: ``(3,)`` pressed point in the object's frame.
+    normal: FloatArray | None = field(metadata=JSON_ONLY)  #: ``(3,)`` outward unit normal.
     moved_m: float | None = field(metadata=JSON_ONLY)  #: distance from the given point to the surface.
     gel_from_object: FloatArray | None = field(metadata=JSON_ONLY)  #: ``(4, 4)``.
-    contact: bool = field(metadata=JSON_ONLY)  #: whether the object touches.
+    contact: bool = field(metadata=JSON_ONLY)  #: whether the object touches the gel.
     contact_pixels: int = field(metadata=JSON_ONLY)
     contact_area_m2: float
     deepest_m: float = field(metadata=JSON_ONLY)
@@ -142,14 +142,14 @@ class RenderedTouch(Result):
     flags: TouchFlags = field(metadata=JSON_ONLY)
     error_estimate: TouchError = field(metadata=JSON_ONLY)
     live: LivePress | None = field(metadata=JSON_ONLY)
-    levels: Mapping[str, Level]  #: of the knobs.
+    levels: Mapping[str, Level]  #: levels of the knobs.
     effects: ExplainedPlan = field(metadata=JSON_ONLY)
     seconds: Mapping[str, float]  #: wall time by stage.
     notes: tuple[str, ...] = field(metadata=JSON_ONLY)
     press: Press = field(metadata=HIDDEN)
 
     def summary(self) -> tuple[str, ...]:
-        """State what was pressed where, and how deep the contact is."""
+        """State the pressed object, the pose and the depth of the contact."""
         lines = [] if self.point_m is None else [self.title]
         lines.append(
             f"{self.contact_pixels} pixels in contact, {1e3 * self.deepest_m:.3f} mm at the deepest"
@@ -166,21 +166,21 @@ class RenderedTouch(Result):
 
     @property
     def title(self) -> str:
-        """State what was pressed and how."""
+        """State the pressed object and the pose of the press."""
         point = () if self.point_m is None else self.point_m
         x, y, z = (round(1e3 * float(value), 2) + 0.0 for value in point)
-        leant, towards, turned = (
+        tilt, towards, yaw = (
             math.degrees(angle or 0.0) for angle in (self.tilt_rad, self.azimuth_rad, self.yaw_rad)
         )
         return (
             f"{self.object or self.source} pressed at ({x:g}, {y:g}, {z:g}) mm, "
-            f"{1e3 * (self.depth_m or 0.0):g} mm deep, tilted {leant:.3g} deg towards {towards:.3g} deg, "
-            f"turned {turned:.3g} deg{f'; {self.level}' if self.level else ''}"
+            f"{1e3 * (self.depth_m or 0.0):g} mm deep, tilted {tilt:.3g} deg towards {towards:.3g} deg, "
+            f"rotated {yaw:.3g} deg{f'; {self.level}' if self.level else ''}"
         )
 
     @property
     def difference(self) -> str:
-        """State how far an ObjectFile's press is from the rasteriser's."""
+        """State the difference of an ObjectFile's press from the rasteriser's."""
         found = self.error_estimate.from_mesh
         if found is None:
             return "by the rasteriser, which the other levels are measured against"
@@ -194,17 +194,17 @@ class RenderedTouch(Result):
 
 @dataclass(frozen=True, eq=False)
 class _Pressed:
-    """A press and its origin."""
+    """A press with its source."""
 
     press: Press
     source: str  #: mesh, ObjectFile or height map.
     seconds: Mapping[str, float]  #: wall time by stage.
     place: ContactPlace | None = None
     gel_from_object: FloatArray | None = None  #: ``(4, 4)``.
-    notes: tuple[str, ...] = ()  #: of the mesh's intake.
+    notes: tuple[str, ...] = ()  #: notes of the mesh's intake.
     of: ObjectFile | None = None
-    touch: ObjectTouch | None = None  #: of ``of``, at a level.
-    reference: Press | None = None  #: by the rasteriser; None if that is the level.
+    touch: ObjectTouch | None = None  #: touch of the ObjectFile ``of`` at a level.
+    reference: Press | None = None  #: press by the rasteriser; None if the level is the rasteriser.
 
 
 _Pose = tuple[float, float, float, float]
@@ -244,12 +244,12 @@ def render_touch(
     pressure_out: Path | None = None,
     picture: Path | None = None,
 ) -> RenderedTouch:
-    """Render what the camera behind a gel sees of a press onto an object, or of a height map.
+    """Render the image by the camera behind a gel of a press onto an object, or of a height map.
 
     Args:
-        mesh: file, ``"builtin:mug"``, or an ObjectFile: its folder or its name. Or give ``height``.
+        mesh: file, ``"builtin:mug"``, or folder or name of an ObjectFile; None with ``height``.
         contact: x, y, z in m in the object's frame, on its surface or within 2 mm.
-        vertex: number of the vertex that is pressed, counted from 0, in place of ``contact``.
+        vertex: number of the pressed vertex, counted from 0, instead of ``contact``.
         depth: distance in m that the centre of the gel is pressed on.
         tilt: angle in rad between the gel's axis and the surface normal.
         azimuth: direction in rad of the tilt, from the gel's x axis at no yaw.
@@ -258,24 +258,24 @@ def render_touch(
             rasteriser on its mesh; None to simulate the press.
         height: NPY file of a height map: ``(rows, columns)`` metres of indentation, positive into the gel.
         heights_of: subject of ``height``: ``"object"``, or ``"gel"`` for the surface of the gel itself.
-        reached: NPY file of the object's own indentation under the surface of a gel, for shadows.
+        reached: NPY file of the object's indentation under the gel's surface in m, for shadows.
         units: unit of the mesh file's coordinates; None to detect it.
         up_axis: axis of the mesh file that points up; None for the one that it declares, else z.
         objectfile: folder of the mesh's networks, for ``accuracy=["touch.shapes=network"]``.
         sensor: shipped name or sensor file; that of the calibration, else ``"gelsight-r1.5"``, if None.
         calibration: file, shipped name, or folder of Taxim's or ObjectFolder's; the sensor's own if None.
         pitch: size of a pixel in m, for a published calibration that does not state it.
-        thickness: of the gel in m; the sensor's if None.
+        thickness: thickness of the gel in m; the sensor's if None.
         background: picture of the untouched gel; the calibration's if None.
-        shadow: whether shadows are drawn; None to draw them if the calibration has a table of them and the
-            contact is known.
+        shadow: whether shadows are rendered; None to render them if the calibration has a table of them and
+            the contact is known.
         markers: file of the dots on this gel, as ``calibrate markers`` writes it.
         noise: standard deviation of the camera's noise in grey levels.
-        seed: of the noise.
-        accuracy: levels of knobs, e.g. ``"touch.optics=exact"``.
-        gel: stiffness, to compute the force as well; None for no force.
-        force_table: file of forces that were measured on this gel, which then give the force.
-        live: picture by a camera, to compare with.
+        seed: random seed of the noise.
+        accuracy: levels of the knobs, e.g. ``"touch.optics=exact"``.
+        gel: stiffness of the gel, to compute the force; None for no force.
+        force_table: file of forces that were measured on this gel, to interpolate the force from.
+        live: picture by a real camera, to compare with.
         out: PNG file to write: the picture, 8-bit RGB.
         height_out: NPY file to write: the height map in m, NaN where it is missing.
         pressure_out: NPY file to write: pressure in Pa of every pixel.
@@ -288,9 +288,9 @@ def render_touch(
         DataRefused: a file that is damaged, or pictures of other sizes.
     """
     if (mesh is None) == (height is None):
-        raise WrongUse("say what is pressed: either a MESH with --contact X Y Z, or --height FILE.npy")
+        raise WrongUse("state what is pressed: either a MESH with --contact X Y Z, or --height FILE.npy")
     if not math.isfinite(noise):
-        raise WrongUse(f"--noise of {noise} grey levels cannot be drawn; give a finite number")
+        raise WrongUse(f"--noise of {noise} grey levels cannot be rendered; use a finite number")
     begun = time.perf_counter()
     # Without the object's own indentation there is nothing that casts a shadow.
     bare = level is not None or (heights_of == "gel" and reached is None)
@@ -330,10 +330,10 @@ def render_touch(
     agreement = None if seen is None else _compare_live(press, seen)
     if pressure_out is not None:
         if press.force is None:
-            raise WrongUse("--pressure-out is of a force, and none is computed; add --force, or leave it out")
+            raise WrongUse("--pressure-out needs a force; add --force, or omit --pressure-out")
         if press.plan.levels[FORCE_LEVEL] == "table":
             raise WrongUse(
-                "a table of forces says how much, not where; leave --pressure-out out, or --force-table"
+                "a table of forces has no distribution of pressure; omit --pressure-out or --force-table"
             )
         write_array(pressure_out, press.force.pressure[0])
     if out is not None:
@@ -351,23 +351,23 @@ def render_touch(
 
 @dataclass(frozen=True, eq=False)
 class _Pressing:
-    """A gel that is pressed, and how."""
+    """The sensor, levels and options of a press."""
 
     gel: Gel
     pose: _Pose
-    levels: Sequence[str]  #: of knobs.
+    levels: Sequence[str]  #: levels of the knobs.
     force: bool  #: whether the force is computed.
 
     def heights(self, path: Path, of: str, under: Path | None) -> _Pressed:
-        """Press a height map; ``under`` is how deep the object reaches below a gel's surface."""
+        """Press a height map; ``under`` is the object's depth below a gel's surface."""
         if of not in ("object", "gel"):
-            raise WrongUse(f"--heights-of {of} is no kind of height map; there are object and gel")
+            raise WrongUse(f"--heights-of {of} is no kind of height map; use object or gel")
         kind: Heights = "object" if of == "object" else "gel"
         begun = time.perf_counter()
         given = read_heights(path, self.gel.sensor, kind)
         if under is not None and kind == "object":
             raise WrongUse(
-                "--reached stands beside the surface of a gel; an object's --height says it already"
+                "--reached needs the surface of a gel; an object's --height includes the indentation"
             )
         reached = None if under is None else read_heights(under, self.gel.sensor)
         seconds = {"read": time.perf_counter() - begun}
@@ -411,7 +411,7 @@ class _Pressing:
     def objectfile(
         self, folder: Path, text: str, contact: Sequence[float] | None, vertex: int | None
     ) -> _Pressed:
-        """Press an object by the surface of the gel that its ObjectFile gives at a level."""
+        """Press an object with the gel's surface from its ObjectFile at a level."""
         begun = time.perf_counter()
         of, level = ObjectFile.open(folder), _touch_level(text)
         touch = open_touch(of, level)
@@ -441,7 +441,7 @@ class _Pressing:
         return _Pressed(press, str(folder), seconds, place, at, of=of, touch=touch, reference=reference)
 
     def _scene(self, file: str) -> SceneFile:
-        """Return a scene of what is touched alone; its material has no effect."""
+        """Return a scene of the touched object alone; its material has no effect."""
         tree = {"schema": 1, "object": {"mesh": file, "material": "steel"}}
         return self._with_noise(validate(tree, SceneFile, "the options"))
 
@@ -451,7 +451,7 @@ class _Pressing:
 
 
 def find_place(mesh: Mesh, contact: Sequence[float] | None, vertex: int | None) -> ContactPlace:
-    """Find the place of a surface nearest to a point in m, or that of a vertex.
+    """Find the point of a surface nearest to a point in m, or at a vertex.
 
     Raises:
         WrongUse: neither or both are given, or a coordinate is not finite.
@@ -597,16 +597,16 @@ def _notes(flags: TouchFlags, pixels: int, place: ContactPlace | None) -> list[s
     if flags.missing_heights:
         notes.append(
             f"{flags.missing_heights} of {pixels} heights are missing (not finite, or no height): the gel "
-            "was hung over them, and neither picture nor contact is known there"
+            "is interpolated over them, and picture and contact are unknown there"
         )
     if flags.fills_window:
         notes.append("the contact fills the window: a flat face then looks like the untouched gel")
     if flags.touches_border:
-        notes.append("the contact reaches the edge of the window; there is more of it than is seen")
+        notes.append("the contact reaches the edge of the window; part of it is outside the picture")
     if (flags.out_of_domain_share or 0.0) > 0.0:
         notes.append(
             f"{flags.out_of_domain_share:.2%} of the pixels are steeper than any press of the calibration "
-            "and drawn as its steepest"
+            "and rendered as its steepest"
         )
     if flags.saturated_values:
         notes.append(f"{flags.saturated_values} values of the picture were clipped to black or white")

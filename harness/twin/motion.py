@@ -256,7 +256,7 @@ class PlannedStrike(_Planned):
     axis: FloatArray  #: ``(3,)`` unit in base, the way of the strike.
 
     def segments(self, step: int) -> tuple[Segment, ...]:
-        """Return the motions of the arm for this strike, to be rehearsed; only the striker touches the object."""
+        """Return the motions of the arm for this strike, to be rehearsed; only the striker makes contact."""
         return (*self.travels(step), *self.lines(step))
 
     def lines(self, step: int) -> tuple[Segment, Segment]:

@@ -161,7 +161,7 @@ def serve(
         contact: model of the contact force on the tool; None for no contact.
         on_cycle: function that receives the pose of the arm in every cycle.
         should_stop: function that returns true to end the server.
-        step: function that performs a step of the run.
+        step: function that returns the number of the current step, for the force noise.
         cues: faults to begin (``mocks.ur.serve``).
         on_ready: function that is called once, when all ports listen.
         answer: function that receives the outcome of each cue.

@@ -37,18 +37,18 @@ _UNIT_OF_LABEL = 3.0
 class IntakeFinding:
     """One object's intake."""
 
-    name: str  #: of the object.
-    material: str  #: of it.
-    mesh: str = field(metadata=JSON_ONLY)  #: its file or ``builtin:`` name.
+    name: str  #: name of the object.
+    material: str  #: material of the object.
+    mesh: str = field(metadata=JSON_ONLY)  #: file or ``builtin:`` name of the mesh.
     verdict: str = "ready"  #: ``"ready"``, ``"look"`` if there are remarks, or ``"excluded"``.
-    reason: str | None = field(default=None, metadata=JSON_ONLY)  #: of the exclusion.
-    remarks: tuple[str, ...] = field(default=(), metadata=JSON_ONLY)  #: what to look at, a sentence each.
-    units: str | None = None  #: that the file's numbers were taken in.
+    reason: str | None = field(default=None, metadata=JSON_ONLY)  #: reason of the exclusion.
+    remarks: tuple[str, ...] = field(default=(), metadata=JSON_ONLY)  #: findings to check, one sentence each.
+    units: str | None = None  #: unit of the coordinates in the file.
     longest_side_m: float | None = None
-    label_m: float | None = None  #: the catalogue's; None where it has none.
+    label_m: float | None = None  #: size in the catalogue; None if it has none.
     watertight: bool | None = None  #: whether the file's surface is closed.
-    faces: int | None = field(default=None, metadata=JSON_ONLY)  #: of the surface.
-    wall_m: float | None = None  #: that all but 2 % of the surface exceeds; None where the surface is open.
+    faces: int | None = field(default=None, metadata=JSON_ONLY)  #: number of faces of the surface.
+    wall_m: float | None = None  #: thickness that 98 % of the wall exceeds; None if open.
     mass_kg: float | None = None
     """implied by volume and density; None where neither volume nor wall is known."""
 

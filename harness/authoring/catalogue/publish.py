@@ -20,7 +20,7 @@ class SentObject:
 
     name: str  #: of the object.
     outcome: str  #: ``"sent"``, ``"there"`` or ``"not built"``.
-    bytes: int  #: sent; 0 where all of it was there, or where it is not built.
+    bytes: int  #: number of sent bytes; 0 if complete before or not built.
 
 
 class ObjectStore:

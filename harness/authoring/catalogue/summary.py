@@ -23,15 +23,15 @@ QUALITY: Mapping[str, tuple[str, str, float]] = MappingProxyType({
 class ObjectSummary:
     """One object of a build."""
 
-    name: str  #: of the object.
-    outcome: str  #: ``"built"``, ``"waiting"``, or why not.
-    reason: str = field(metadata=JSON_ONLY)  #: where it is not built.
-    record: ObjectRecord | None = field(metadata=HIDDEN)  #: of the last attempt; None where there was none.
+    name: str  #: name of the object.
+    outcome: str  #: ``"built"``, ``"waiting"``, or the reason why not.
+    reason: str = field(metadata=JSON_ONLY)  #: reason why the object is not built.
+    record: ObjectRecord | None = field(metadata=HIDDEN)  #: the last attempt; None if there was none.
     object: ObjectFile | None = field(metadata=HIDDEN)
     """an ObjectFile that stands, of this key or of an earlier one; None where there is none."""
     attempts: int
-    seconds: float | None  #: of the last attempt; None where there was none.
-    modes: int | None  #: None where there is no sound.
+    seconds: float | None  #: duration of the last attempt; None if there was none.
+    modes: int | None  #: number of modes; None without sound.
     quality: Mapping[str, float] = field(default_factory=dict)
     """by the keys of ``QUALITY``, those that there are, in the units of their headings."""
 

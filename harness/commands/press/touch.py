@@ -123,7 +123,7 @@ def touch(
     from harness.basics.quantities import LENGTH
 
     if out is None:
-        raise WrongUse("say where the picture goes: --out FILE.png")
+        raise WrongUse("no file for the picture; add --out FILE.png")
     options.require_files(
         ("--out", out, ".png"),
         ("--picture", picture, ".png"),

@@ -96,8 +96,7 @@ class QuerySettings:
             raise WrongUse(f"--seconds {self.seconds:g}: sounds are above 0 and at most 60 s long")
         if self.compat and (self.size, self.seconds, self.rate) != (COMPAT_SIZE, 3.0, 44100.0):
             raise WrongUse(
-                "--objectfolder-compat says size, length and rate itself; leave --size, --seconds and --rate "
-                "out"
+                "--objectfolder-compat sets size, length and rate; leave --size, --seconds and --rate out"
             )
 
 
@@ -105,7 +104,9 @@ class QuerySettings:
 class AnsweredQueries:
     """Files written for a set of query files, and their cost."""
 
-    files: dict[str, list[Path]] = field(default_factory=dict)  #: by sense, in the order of the queries.
+    files: dict[str, list[Path]] = field(
+        default_factory=dict
+    )  #: written files by sense, in the order of the queries.
     full_scale: float | None = None  #: of the sounds, in the sound's unit; None for each its own.
     notes: list[str] = field(default_factory=list)  #: what the operator should know.
     seconds: dict[str, float] = field(default_factory=dict)  #: on the clock, by sense.

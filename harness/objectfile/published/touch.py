@@ -140,8 +140,8 @@ class TaximPicture:
         pack = read_published(folder, PITCH)
         if pack.rest is None or pack.rest.shape != shape:
             raise CalibrationRefused(
-                f"{folder} has no shape of the untouched gel with {shape[0]} x {shape[1]} pixels (depth_bg.npy); "
-                f"use the folder that ObjectFolder 2.0 publishes, with {TABLE} and {PRESSES}"
+                f"{folder} has no shape of the untouched gel with {shape[0]} x {shape[1]} pixels "
+                f"(depth_bg.npy); use the folder that ObjectFolder 2.0 publishes, with {TABLE} and {PRESSES}"
             )
         table, rest = read_table(folder / TABLE), pack.rest / PITCH
         return cls(table, rest, pack.calibration.background.astype(np.float64) - table_colours(rest, table))

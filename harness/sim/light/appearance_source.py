@@ -228,7 +228,7 @@ def _coloured(mesh: Mesh, read: MeshFile, crease: float) -> Appearance:
 
 
 def _print_of(material: str) -> ByteArray:
-    """Return the printed picture of a material, ``(rows, columns, 3)`` sRGB, with the aspect of the object's box."""
+    """Return the print of a material, ``(rows, columns, 3)`` sRGB, with the aspect of the object's box."""
     if material not in COLOURS:
         raise WrongUse(f"no colour of {material!r} is known; there are {', '.join(COLOURS)}")
     base, printed = (np.array(colour) for colour in COLOURS[material])

@@ -240,7 +240,7 @@ def parse_json(data: bytes, name: str) -> dict[str, Any]:
         )
     if data.count(b"[") + data.count(b"{") > _MAX_JSON_VALUES:
         raise MeshRefused(
-            f"{name} holds more than {_MAX_JSON_VALUES:,} lists and objects of JSON, the most that are read"
+            f"{name} holds more than {_MAX_JSON_VALUES:,} lists and objects of JSON, the maximum"
         )
     try:
         tree = json.loads(data.decode("utf-8-sig"))
