@@ -24,8 +24,8 @@ from experiments.paper.rendering import (
     RenderingMethod,
     RenderingWork,
     Sense,
+    load_or_train_graph,
     picture_scores,
-    stored_graph,
     train_network,
 )
 from harness.authoring.vision.data import HeldOutViews, held_out_pictures
@@ -227,7 +227,7 @@ def ball_of(mesh: Mesh) -> tuple[FloatArray, float]:
     return mesh.bounds.mean(axis=0), 0.5 * mesh.diagonal
 
 
-def opened_field(data: bytes, mesh: Mesh, samples: int) -> UniformField:
+def open_field(data: bytes, mesh: Mesh, samples: int) -> UniformField:
     """Open the network of a graph to render an object."""
     inputs, outputs = osf_tensors(REACH)
     return UniformField(osf_field(Network(data, FIELD_FILE, inputs, outputs)), *ball_of(mesh), samples)
@@ -288,7 +288,7 @@ def look_methods(bench: ViewBench, of: ObjectFile, work: RenderingWork) -> list[
 
 def _by_field(bench: ViewBench, work: RenderingWork) -> MadeMethod:
     data, seconds = train_network(work, "field", "the field of 1.0", bench, FIELD, bench.identity)
-    field = opened_field(data, bench.lit.appearance.mesh, FIELD.samples)
+    field = open_field(data, bench.lit.appearance.mesh, FIELD.samples)
     return MadeMethod(lambda number: field.picture(*bench.view(number)), seconds)
 
 
@@ -301,7 +301,7 @@ def _by_cells(bench: ViewBench, work: RenderingWork) -> MadeMethod:
         return vision_graph(model).SerializeToString()
 
     identity = ("kilo osf", bench.identity, asdict(KILO_OSF.size), *astuple(KILO_OSF)[1:])
-    data, seconds = stored_graph(work.store, identity, "KiloOSF", train, torch=False)
+    data, seconds = load_or_train_graph(work.store, identity, "KiloOSF", train, torch=False)
     fields = CellFields(VisionNetworks(data), bench.lit.appearance.mesh, KILO_OSF.cells)
     return MadeMethod(lambda number: fields.picture(*bench.view(number)), seconds)
 

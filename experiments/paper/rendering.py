@@ -141,7 +141,7 @@ def train_network(
     lesson: str,
     *settings: object,
 ) -> tuple[bytes, float]:
-    """Train a network by ``rendering_training.train_NAME``; see ``stored_graph``.
+    """Train a network by ``rendering_training.train_NAME``; see ``load_or_train_graph``.
 
     The queries of the bench must not be in its training data; ``lesson`` is a digest of that data.
     """
@@ -152,10 +152,10 @@ def train_network(
         )
         return trained
 
-    return stored_graph(work.store, (name, lesson, astuple(spec), *settings), what, train)
+    return load_or_train_graph(work.store, (name, lesson, astuple(spec), *settings), what, train)
 
 
-def stored_graph(
+def load_or_train_graph(
     store: Store, identity: tuple[object, ...], what: str, train: Callable[[], bytes], torch: bool = True
 ) -> tuple[bytes, float]:
     """Load the graph of a network from the store, or train it and store it.
@@ -232,7 +232,7 @@ def measure_sense(
         if isinstance(stored, Mapping):
             timed = {name.removeprefix("of "): seconds for name, seconds in stored.items()}
         else:
-            timed = timed_in_turn({each.name: make(each) for each in rendered}, bench.count)
+            timed = time_in_turn({each.name: make(each) for each in rendered}, bench.count)
             work.store.put(key, {f"of {name}": seconds for name, seconds in timed.items()})
     for method in methods:
         if method.name in missing:
@@ -262,7 +262,7 @@ def _quality(
     return found
 
 
-def timed_in_turn(made: Mapping[str, MadeMethod], count: int, rounds: int = ROUNDS) -> dict[str, FloatArray]:
+def time_in_turn(made: Mapping[str, MadeMethod], count: int, rounds: int = ROUNDS) -> dict[str, FloatArray]:
     """Measure ``(k,)`` CPU seconds of each method; slow methods take part in fewer rounds."""
     taken: dict[str, list[float]] = {name: [] for name in made}
     for name, method in made.items():

@@ -102,7 +102,7 @@ class StrikeBench:
         """``(t,)`` the exact sum of the reference's modes."""
         node = self.nodes[number]
         gains = self.modes.shapes[node] @ self.modes.normals[node]
-        return summed(self.modes.frequencies, self.rates, gains, "double")
+        return sum_modes(self.modes.frequencies, self.rates, gains, "double")
 
     def scores(self, number: int, rendered: AnyArray) -> Mapping[str, float]:
         """STFT distance and envelope distance."""
@@ -110,7 +110,7 @@ class StrikeBench:
         return {"stft_distance": found.stft, "envelope_distance": found.envelope}
 
 
-def summed(
+def sum_modes(
     frequencies: FloatArray, rates: FloatArray, gains: AnyArray, level: SynthesisLevel = "fast"
 ) -> FloatArray:
     """Synthesize the ``(t,)`` sound of ``(m,)`` gains, with the length and the rate of the distances."""
@@ -272,7 +272,7 @@ def _by_gains(bench: StrikeBench, network: Network) -> Render:
     def observe(number: int) -> AnyArray:
         point, normal = bench.strike(number)
         gains = network({"points": point[None]})["gains"][0].astype(np.float64) @ normal
-        return summed(bench.modes.frequencies, bench.rates, gains)
+        return sum_modes(bench.modes.frequencies, bench.rates, gains)
 
     return observe
 
@@ -315,7 +315,7 @@ def _by_hexahedra(bench: StrikeBench) -> MadeMethod:
 
     def observe(number: int) -> AnyArray:
         point, normal = bench.strike(number)
-        return summed(modes.frequencies, rates, modes.at(point) @ normal)
+        return sum_modes(modes.frequencies, rates, modes.at(point) @ normal)
 
     return MadeMethod(observe, time.process_time() - begun)
 

@@ -149,7 +149,9 @@ class Agreement:
         ]
 
 
-def judged(about: str, senses: Sequence[SenseResiduals], false_alarm: float = FALSE_ALARM) -> Agreement:
+def judge_residuals(
+    about: str, senses: Sequence[SenseResiduals], false_alarm: float = FALSE_ALARM
+) -> Agreement:
     """Test the residuals of each sense, which have chi-square distributions if the model is right.
 
     ``false_alarm`` is divided evenly among the senses, and again among the residuals of each (Bonferroni).

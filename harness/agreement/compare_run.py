@@ -5,7 +5,7 @@ from dataclasses import replace
 from time import process_time
 from typing import ParamSpec
 
-from harness.agreement.agreement import Agreement, Sense, SenseResiduals, Source, judged
+from harness.agreement.agreement import Agreement, Sense, SenseResiduals, Source, judge_residuals
 from harness.agreement.arm import compare_with_twin
 from harness.agreement.camera import compare_camera
 from harness.agreement.sound import compare_sound
@@ -49,8 +49,8 @@ def agreement_of(
     unknown = measured or (HIDDEN if subject.scene.object.is_hidden else "")
     if unknown:
         why = f"{unknown}; {NAME_ONE}"
-        return judged(name, [SenseResiduals(sense, source, (), why) for sense, source in _NOTHING])
-    return judged(name, list(_compared(subject, contacts_of(run), reference)))
+        return judge_residuals(name, [SenseResiduals(sense, source, (), why) for sense, source in _NOTHING])
+    return judge_residuals(name, list(_compared(subject, contacts_of(run), reference)))
 
 
 def _compared(

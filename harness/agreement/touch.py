@@ -101,7 +101,7 @@ def compare_touch(subject: Subject, source: Source, contacts: Sequence[PressedCo
         else:
             notes.append(f"step {contact.step + 1}: neither the picture nor the model shows a contact")
     if gross_share(source) and residuals:
-        residuals.append(counted_residual(residuals, gross_share(source)))
+        residuals.append(count_residual(residuals, gross_share(source)))
     why = "; ".join(notes) or ("" if contacts else "no picture of the gel was recorded")
     refused = contacts[0].step if contacts and all(contact.refusal for contact in contacts) else None
     return SenseResiduals("touch", source, tuple(residuals), why, refused_at=refused)
@@ -140,12 +140,12 @@ def surface_residual(step: int, found: Surfaces, noise: SurfaceNoise, gross: flo
         "prior_chi_square": found.prior,
     }
     clipped = np.minimum(gaps**2 / variances, noise.most**2)
-    chi_square = mixed(dof * clipped.mean(axis=1) + found.prior, dof, gross)
+    chi_square = combine_chi_squares(dof * clipped.mean(axis=1) + found.prior, dof, gross)
     sides = SideBySide(found.read, found.modelled, "m")
     return Residual(step, "gel surface", chi_square, dof, numbers, sides)
 
 
-def mixed(chi_squares: FloatArray, dof: float, gross: float = 0.0) -> float:
+def combine_chi_squares(chi_squares: FloatArray, dof: float, gross: float = 0.0) -> float:
     """Combine ``(s,)`` chi-squares of equally probable noises into one with their mean p-value.
 
     ``gross`` is the probability of an outlier of any size.
@@ -156,8 +156,8 @@ def mixed(chi_squares: FloatArray, dof: float, gross: float = 0.0) -> float:
     return float(chi2.isf(max(probability, _LEAST), dof))
 
 
-def counted_residual(residuals: Sequence[Residual], gross: float) -> Residual:
-    """Test the number of contacts that do not fit, as ``-2 ln p``; ``gross`` as in ``mixed``."""
+def count_residual(residuals: Sequence[Residual], gross: float) -> Residual:
+    """Test the number of contacts that do not fit, as ``-2 ln p``; ``gross`` as above."""
     share = gross + (1.0 - gross) * _IMPROBABLE
     found = chi2.sf([one.chi_square for one in residuals], [one.dof for one in residuals])
     unlike = int(np.count_nonzero(found < share))

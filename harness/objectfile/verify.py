@@ -66,7 +66,7 @@ class ObjectCheck:
 def verify(of: Either) -> list[ObjectCheck]:
     """Look at everything; a failure ends its own check alone. An import has no mesh to look at."""
     checks = []
-    for name, look in _looks(of):
+    for name, look in _list_checks(of):
         try:
             checks.append(ObjectCheck(name, True, look()))
         except TouchstoneError as error:
@@ -74,17 +74,17 @@ def verify(of: Either) -> list[ObjectCheck]:
     return checks
 
 
-def _looks(of: Either) -> Iterator[tuple[str, Callable[[], str]]]:
+def _list_checks(of: Either) -> Iterator[tuple[str, Callable[[], str]]]:
     for entry in of.description.files:
         yield f"{entry.file}: bytes", partial(_check_bytes, of, entry)
-    yield "folder: nothing else", partial(_no_others, of)
+    yield "folder: nothing else", partial(_check_extra_files, of)
     if isinstance(of, ObjectFile):
         yield "mesh", partial(_mesh, of)
     for modality, network in of.description.networks.items():
         run = cache(partial(_open, of, network))
-        yield f"{modality}: graph", partial(_look_at_graph, run)
-        yield f"{modality}: domain", partial(look_at_domain, of, run)
-        yield f"{modality}: self-test", partial(look_at_self_test, run, network.self_test)
+        yield f"{modality}: graph", partial(_check_graph, run)
+        yield f"{modality}: domain", partial(check_domain, of, run)
+        yield f"{modality}: self-test", partial(check_self_test, run, network.self_test)
     if isinstance(of, PublishedObject):
         return
     audio = of.description.audio
@@ -94,18 +94,18 @@ def _looks(of: Either) -> Iterator[tuple[str, Callable[[], str]]]:
             yield "audio: network and table", partial(_agreement, of)
     touch = of.description.touch
     if touch is not None and touch.codes is not None:
-        yield "touch: codes and mesh", partial(look_at_codes, of, touch.codes)
+        yield "touch: codes and mesh", partial(check_codes, of, touch.codes)
     vision = of.description.vision
     if vision is not None:
-        yield "vision: networks", partial(_look_at_networks, of, vision)
-        yield "vision: networks and surface", partial(_look_at_views, of, vision)
+        yield "vision: networks", partial(_check_networks, of, vision)
+        yield "vision: networks and surface", partial(_check_views, of, vision)
 
 
 def _check_bytes(of: Either, entry: FileEntry) -> str:
     return f"{len(of.read(entry))} bytes, of the hash that object.json says"
 
 
-def _no_others(of: Either) -> str:
+def _check_extra_files(of: Either) -> str:
     known = {DESCRIPTION, FOLDER_LOCK, *(entry.file for entry in of.description.files)}
     others = sorted(path.name for path in of.folder.iterdir() if path.name not in known)
     stopped = [name for name in others if name.startswith(".") and name.endswith("_training.npz")]
@@ -158,12 +158,12 @@ def _open(of: Either, entry: NetworkEntry) -> Network:
     return Network(of.read(entry), entry.file, entry.inputs, entry.outputs)
 
 
-def _look_at_graph(run: Opened) -> str:
+def _check_graph(run: Opened) -> str:
     run()
     return "valid ONNX of known operations, weights inside and finite, inputs and outputs as described"
 
 
-def look_at_domain(of: Either, run: Opened) -> str:
+def check_domain(of: Either, run: Opened) -> str:
     """Query a network at random inputs of its stated domain.
 
     Raises:
@@ -189,7 +189,7 @@ def look_at_domain(of: Either, run: Opened) -> str:
     return f"finite at {2 * _INSIDE} places of the domain, half of them at its edge"
 
 
-def look_at_self_test(run: Opened, test: SelfTest) -> str:
+def check_self_test(run: Opened, test: SelfTest) -> str:
     """Repeat the queries of the network's self-test.
 
     Raises:
@@ -227,7 +227,7 @@ def _shape(tensor: Tensor, rows: int) -> tuple[int, ...]:
     return tuple(rows if size == "n" else size for size in tensor.shape)
 
 
-def look_at_codes(of: ObjectFile, entry: CodesEntry) -> str:
+def check_codes(of: ObjectFile, entry: CodesEntry) -> str:
     """Compare maps of upright presses at some coded points with the rasterised mesh.
 
     Raises:
@@ -250,7 +250,7 @@ def look_at_codes(of: ObjectFile, entry: CodesEntry) -> str:
     return f"they differ by {middle * 1e6:.3g} um in the median of {len(chosen)} presses, {worst:.3g} at most"
 
 
-def _look_at_networks(of: ObjectFile, entry: VisionEntry) -> str:
+def _check_networks(of: ObjectFile, entry: VisionEntry) -> str:
     networks = VisionNetworks(of.read(entry.network), entry.network.file)
     require_described(networks, entry)
     return (
@@ -259,7 +259,7 @@ def _look_at_networks(of: ObjectFile, entry: VisionEntry) -> str:
     )
 
 
-def _look_at_views(of: ObjectFile, entry: VisionEntry) -> str:
+def _check_views(of: ObjectFile, entry: VisionEntry) -> str:
     """Check from views around the object that the networks are opaque at the surface."""
     vision, medians = open_vision(of, threads=1), []
     camera = camera_for(vision.surface, _PIXELS, _PIXELS)

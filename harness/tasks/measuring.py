@@ -225,7 +225,7 @@ class MeasuredTable(Result):
         """Yield errors and further means by method, then means by object, of each condition."""
         for condition in sorted({tuple(row.conditions.items()) for row in self.found}):
             chosen = [row for row in self.found if tuple(row.conditions.items()) == condition]
-            title = f"mock: {_said(condition)}; {chosen[0].runs} runs"
+            title = f"mock: {_format_condition(condition)}; {chosen[0].runs} runs"
             cells = [_cells(row) for row in chosen]
             shown = [k for k in range(len(_HEADINGS)) if any(line[k] for line in cells)]
             headings = [_HEADINGS[k] for k in shown]
@@ -255,7 +255,7 @@ class MeasuredTable(Result):
                     ]
                     for method in methods
                 ]
-                title = f"mock: {_said(condition)}; mean {value} of each object, in mm"
+                title = f"mock: {_format_condition(condition)}; mean {value} of each object, in mm"
                 yield title, ["method", *found], [line for line in lines if any(line[1:])]
 
     def summary(self) -> tuple[str, ...]:
@@ -332,7 +332,7 @@ def measure_table(
     )
 
 
-def _said(condition: Key) -> str:
+def _format_condition(condition: Key) -> str:
     return ", ".join(f"{name} {_GAPS.get(level, level)}" for name, level in condition)
 
 

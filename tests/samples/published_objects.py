@@ -34,12 +34,12 @@ def imported_object(
     tree: dict[str, Any], folder: Path, audio: Bounds | None = None, touch: Bounds | None = None
 ) -> PublishedObject:
     """Import a published file's tables with torch; bounds are those of version 1.0."""
-    from harness.authoring.published.imported import gathered, written
+    from harness.authoring.published.imported import gathered
     from harness.authoring.published.layout import format_of
 
     kind = format_of(tree, "mug.pth")
     source = Source(what=f"ObjectFile of {kind}", origin="mug.pth", licence="none", sha256="0" * 64)
-    return written(gathered(tree, "mug.pth", kind, audio, touch), kind, source, "mug", folder)
+    return write_parts(gathered(tree, "mug.pth", kind, audio, touch), kind, source, "mug", folder)
 
 
 def without_bounds(folder: Path) -> PublishedObject:

@@ -215,7 +215,7 @@ class ContactMeasurement(Measurement):
         return _NO_OBJECTFILE if networks and scene.object.objectfile is None else None
 
     def is_offered(self, setting: Setting) -> bool:
-"""State whether a setting has the default elements of modes.
+        """State whether a setting has the default elements of modes.
 
         Coarser elements are measured for their loss of accuracy; they save time once per object. Of
         settings with equal errors, a budget would select one by chance.

@@ -120,12 +120,12 @@ class LocalRunner:
                         workers.append(ObjectWorker(self._limits))
                         idle.append(workers[-1])
                     idle.pop().begin(*waiting.popleft())
-                yield from self._finished(waiting, workers)
+                yield from self._wait_for_jobs(waiting, workers)
         finally:
             for worker in workers:
                 worker.stop()
 
-    def _finished(
+    def _wait_for_jobs(
         self, waiting: deque[tuple[Job, int]], workers: list[ObjectWorker]
     ) -> Iterator[ObjectRecord]:
         """Wait until a job ends, and yield the records of finished jobs; a job that died once is repeated."""

@@ -68,10 +68,10 @@ def import_published(
     kind = format_of(tree, path.name)
     source = Source(what=f"ObjectFile of {kind}", origin=path.name, licence=licence, sha256=sha256_of(path))
     parts = gathered(tree, path.name, kind, audio_bounds, touch_bounds)
-    return written(parts, kind, source, name or path.stem, out)
+    return write_parts(parts, kind, source, name or path.stem, out)
 
 
-def written(parts: ImportedParts, kind: Format, source: Source, name: str, out: Path) -> PublishedObject:
+def write_parts(parts: ImportedParts, kind: Format, source: Source, name: str, out: Path) -> PublishedObject:
     """Write the parts of a file to the folder ``out``, which is created.
 
     Raises:

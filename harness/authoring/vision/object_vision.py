@@ -65,7 +65,7 @@ def build_vision(
         provenance=provenance_of(wanted, "vision", vision.settings, (source, *_textures(wanted, look))),
         # JSON holds no infinity, which is what equal pictures have for decibels.
         measured={name: value for name, value in vision.errors.items() if math.isfinite(value)},
-        surface=drawn_surface(taken.mesh, look.mesh),
+        surface=choose_surface(taken.mesh, look.mesh),
     )
     made = with_vision(created, part)
     (out / CHECKPOINT).unlink(missing_ok=True)
@@ -73,7 +73,7 @@ def build_vision(
     return BuiltVision(made, vision, (*taken.said, *look.remarks), seconds)
 
 
-def drawn_surface(mesh: Mesh, looked_at: Mesh) -> Mesh | None:
+def choose_surface(mesh: Mesh, looked_at: Mesh) -> Mesh | None:
     """Return the surface that pictures are rendered on; None if it is the object's mesh.
 
     The surface has seams if its texture has them. They are closed, since the pixels that a

@@ -104,9 +104,7 @@ class QuerySettings:
 class AnsweredQueries:
     """Files written for a set of query files, and their cost."""
 
-    files: dict[str, list[Path]] = field(
-        default_factory=dict
-    )  #: written files by sense, in the order of the queries.
+    files: dict[str, list[Path]] = field(default_factory=dict)  #: written files by sense, in query order.
     full_scale: float | None = None  #: of the sounds, in the sound's unit; None for each its own.
     notes: list[str] = field(default_factory=list)  #: what the operator should know.
     seconds: dict[str, float] = field(default_factory=dict)  #: on the clock, by sense.

@@ -107,7 +107,7 @@ def codes_graph(
     reached = motion.where_covered(nodes.add("Neg", along), covered)
     limits = [nodes.constant(np.array(value, np.float32)) for value in (0.0, sensor.gel_thickness)]
     deep = nodes.add("Clip", reached, *limits)
-    nodes.add("Identity", hung(nodes, deep, sensor, skirt), name="maps")
+    nodes.add("Identity", add_border(nodes, deep, sensor, skirt), name="maps")
     # The output ``gaps`` is of the coarse rays, which are followed beyond the gel's reach.
     for _ in range(_BEYOND):
         near = motion.to_height(heights, near, coarse, coarse)
@@ -179,7 +179,7 @@ def _check(patches: PatchCodes, sensor: TactileSensor, lookups: int) -> None:
         raise WrongUse("a mean of heights that is not finite, or a pitch that is not positive")
 
 
-def hung(nodes: Nodes, deep: str, sensor: TactileSensor, skirt: GelSkirt) -> str:
+def add_border(nodes: Nodes, deep: str, sensor: TactileSensor, skirt: GelSkirt) -> str:
     """Add the contact border (``harness.sim.gel.gel.deform``) to ``(n, rows, columns)`` m of penetration.
 
     Each blur is a product with a banded matrix.

@@ -97,7 +97,7 @@ def test_places_within_a_closed_surface_are_told_from_those_without() -> None:
 
 def test_a_field_that_was_trained_for_seconds_beats_white_alone() -> None:
     pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
-    from experiments.paper.look import ViewBench, opened_field, shown
+    from experiments.paper.look import ViewBench, open_field, shown
     from experiments.paper.rendering import FieldSpec
     from experiments.paper.rendering_training import train_field
     from harness.authoring.vision.data import held_out_pictures
@@ -109,7 +109,7 @@ def test_a_field_that_was_trained_for_seconds_beats_white_alone() -> None:
     views = held_out_pictures(lit.appearance.mesh, 1, 48, 48, 0, DISTANCE)
     bench = ViewBench(lit, views, tuple(shown(each) for each in reference_pictures(lit, views, 3)))
     spec = FieldSpec(depth=2, width=64, octaves=5, samples=64, places=60_000, steps=150, batch=2048)
-    field = opened_field(train_field(bench, spec, lambda doing, share: None), lit.appearance.mesh, 64)
+    field = open_field(train_field(bench, spec, lambda doing, share: None), lit.appearance.mesh, 64)
     picture = field.picture(views.cameras[0], views.lights[0])
     white = bench.scores(0, np.full_like(picture, 255))["psnr_db"]
     assert bench.scores(0, picture)["psnr_db"] > white + 3.0

@@ -15,9 +15,9 @@ from experiments.paper.rendering import (
     RenderingWork,
     Sense,
     TorchMissing,
+    load_or_train_graph,
     measure_sense,
-    stored_graph,
-    timed_in_turn,
+    time_in_turn,
 )
 from harness.basics.arrays import AnyArray
 from harness.basics.store import Store
@@ -121,7 +121,7 @@ def test_methods_render_in_turn(tmp_path: Path) -> None:
 
         return MadeMethod(render)
 
-    timed_in_turn({"a": observe("a"), "b": observe("b")}, 2, rounds=3)
+    time_in_turn({"a": observe("a"), "b": observe("b")}, 2, rounds=3)
     assert order == ["a", "b"] * 4  # one round to warm up
 
 
@@ -129,8 +129,12 @@ def test_a_graph_is_trained_once_and_torch_is_asked_for_only_then(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = Store(tmp_path)
-    data, seconds = stored_graph(store, ("one", 1), "one", lambda: b"graph", torch=False)
+    data, seconds = load_or_train_graph(store, ("one", 1), "one", lambda: b"graph", torch=False)
     monkeypatch.setattr("experiments.paper.rendering.find_spec", lambda name: None)
-    assert stored_graph(store, ("one", 1), "one", lambda: b"other") == (data, seconds) == (b"graph", seconds)
+    assert (
+        load_or_train_graph(store, ("one", 1), "one", lambda: b"other")
+        == (data, seconds)
+        == (b"graph", seconds)
+    )
     with pytest.raises(TorchMissing, match=r"pip install"):
-        stored_graph(store, ("two", 1), "two", lambda: b"other")
+        load_or_train_graph(store, ("two", 1), "two", lambda: b"other")

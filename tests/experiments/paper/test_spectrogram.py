@@ -13,7 +13,7 @@ from experiments.paper.sound import (
     between_nodes,
     sound_methods,
     sound_of_spectrum,
-    summed,
+    sum_modes,
 )
 from harness.authoring.audio.data import split_nodes
 from harness.basics.materials import MATERIALS
@@ -38,7 +38,7 @@ def test_the_exact_spectrum_sounds_as_the_sum_of_the_modes_below_8_khz() -> None
     basis = SpectrumBasis.of(bench)
     node = bench.nodes[0]
     gains = (bench.modes.shapes[node] @ bench.modes.normals[node])[basis.modes]
-    exact = summed(bench.modes.frequencies[basis.modes], bench.rates[basis.modes], gains, "double")
+    exact = sum_modes(bench.modes.frequencies[basis.modes], bench.rates[basis.modes], gains, "double")
     sound = sound_of_spectrum(basis.spectrum(gains))
     assert sound.shape == exact.shape
     # A sound that begins at once has more than 8 kHz holds: what the resampler leaves out is in its onset.

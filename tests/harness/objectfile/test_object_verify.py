@@ -18,7 +18,7 @@ from harness.objectfile.file import ObjectFile, file_entry
 from harness.objectfile.npy_file import npy_bytes
 from harness.objectfile.self_test import open_network
 from harness.objectfile.surface_file import ply_bytes
-from harness.objectfile.verify import look_at_domain, look_at_self_test, verify
+from harness.objectfile.verify import check_domain, check_self_test, verify
 from tests.samples.object_bench import MODES, egg, egg_waves, exchange, rewrite
 
 SAMPLES = Path(__file__).parent / "samples"
@@ -190,8 +190,8 @@ def test_a_network_is_asked_all_over_its_own_domain(
     data = root_graph()
     sound = squares((0.0, 0.0), (1.0, 20.0), data)
     network = open_network(data, sound)
-    assert "finite at" in look_at_domain(egg_object, lambda: network)
-    assert "as when it was made" in look_at_self_test(lambda: network, sound.self_test)
+    assert "finite at" in check_domain(egg_object, lambda: network)
+    assert "as when it was made" in check_self_test(lambda: network, sound.self_test)
     wrong = open_network(data, squares(low, high, data))
     with pytest.raises(DataRefused, match=said):
-        look_at_domain(egg_object, lambda: wrong)
+        check_domain(egg_object, lambda: wrong)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.agreement.agreement import Agreement, Residual, SenseResiduals, SideBySide, judged
+from harness.agreement.agreement import Agreement, Residual, SenseResiduals, SideBySide, judge_residuals
 from harness.experiment.report_content import CaptionedPicture, Missing, Picture, ReportTable
 from harness.report.agreement_part import show_agreement
 from harness.report.figures.figures import Album
@@ -22,7 +22,7 @@ def agreement() -> Agreement:
         Residual(0, "gel surface", 3.0, 4.0, {"rms_m": 4e-5}, fields),
         Residual(2, "gel surface", 99.0, 4.0, {"rms_m": 4e-4, "turned_rad": 0.1}, fields),
     )
-    return judged(
+    return judge_residuals(
         "mug",
         [
             SenseResiduals("touch", "network", touch),
@@ -50,7 +50,7 @@ def test_a_run_that_was_not_compared_says_so(tmp_path: Path) -> None:
 
 
 def test_a_run_of_which_nothing_can_be_compared_has_no_picture(tmp_path: Path) -> None:
-    nothing = judged("mug", [SenseResiduals("touch", "reference", (), "no picture of the gel")])
+    nothing = judge_residuals("mug", [SenseResiduals("touch", "reference", (), "no picture of the gel")])
     words, _, shown = show_agreement(nothing, Album(tmp_path))
     assert str(words).endswith(" Nothing could be compared.")
     assert isinstance(shown, CaptionedPicture)

@@ -11,7 +11,7 @@ import trimesh
 from harness.authoring.training import Report
 from harness.authoring.vision import object_vision
 from harness.authoring.vision import profiles as vision_profiles
-from harness.authoring.vision.object_vision import drawn_surface, without_seams
+from harness.authoring.vision.object_vision import choose_surface, without_seams
 from harness.authoring.vision.profiles import CellsSpec, VisionProfile
 from harness.authoring.vision.vision import CHECKPOINT, AuthoredVision, author_vision
 from harness.basics.mesh import Mesh
@@ -146,11 +146,11 @@ def test_the_objects_own_mesh_is_drawn_along_where_it_is_the_same_surface() -> N
     mug = build("mug", 8e-3)
     torn = Mesh(mug.corners.reshape(-1, 3), np.arange(3 * len(mug.faces)).reshape(-1, 3))
     assert is_same_surface(mug, torn)
-    assert drawn_surface(mug, torn) is None
+    assert choose_surface(mug, torn) is None
     moved = Mesh(mug.vertices + 3e-4 * mug.diagonal, mug.faces)
     open_one = Mesh(mug.vertices, mug.faces[:-20])
     for other in (moved, open_one, build("mug", 4e-3)):
         assert not is_same_surface(mug, other)
-        kept = drawn_surface(mug, other)
+        kept = choose_surface(mug, other)
         assert kept is not None
         np.testing.assert_allclose(kept.bounds, other.bounds)

@@ -13,7 +13,7 @@ from harness.bench.named_files import SHIPPED
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.touch.nodes import SurfaceNodes, nodes_bytes, nodes_from
 from harness.objectfile.touch.touch import CodeMaps, open_touch
-from harness.objectfile.verify import look_at_codes, verify
+from harness.objectfile.verify import check_codes, verify
 from harness.sim.gel.press_pose import Presses
 from tests.samples import touch_bench as tb
 from tests.samples.object_bench import exchange, rewrite
@@ -61,7 +61,7 @@ def test_shipped_objects_have_codes_that_agree_with_their_meshes(name: str) -> N
     touch = of.description.touch
     assert touch is not None
     assert touch.codes is not None
-    assert "in the median of 16 presses" in look_at_codes(of, touch.codes)
+    assert "in the median of 16 presses" in check_codes(of, touch.codes)
 
 
 def test_codes_and_reference_are_levels_of_one_quantity(peg_object: ObjectFile) -> None:
