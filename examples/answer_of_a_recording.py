@@ -1,4 +1,4 @@
-"""What a recorded run says: python examples/answer_of_a_recording.py RUN."""
+"""Answer a recorded run: python examples/answer_of_a_recording.py RUN."""
 
 import sys
 

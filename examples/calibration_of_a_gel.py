@@ -1,4 +1,4 @@
-"""A calibration from pictures of ball presses: python examples/calibration_of_a_gel.py FOLDER."""
+"""Calibrate a gel from pictures of ball presses: python examples/calibration_of_a_gel.py FOLDER."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The tactile image of a press, and the depth read from it: python examples/image_of_a_press.py OUT.png."""
+"""Render the tactile image of a press, and read its depth: python examples/image_of_a_press.py OUT.png."""
 
 import sys
 from pathlib import Path

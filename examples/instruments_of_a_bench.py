@@ -1,4 +1,4 @@
-"""The instruments of a bench, and what a camera sees: python examples/instruments_of_a_bench.py OUT.png."""
+"""Check the instruments of a bench, and take a picture: python examples/instruments_of_a_bench.py OUT.png."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The lowest modes of a mesh: python examples/modes_of_a_mesh.py [MESH] [MATERIAL]."""
+"""Compute the lowest modes of a mesh: python examples/modes_of_a_mesh.py [MESH] [MATERIAL]."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""The sound of a mesh as an ObjectFile, built and checked: python examples/objectfile_of_a_mesh.py FOLDER."""
+"""Build and check the sound of a mesh as an ObjectFile: python examples/objectfile_of_a_mesh.py FOLDER."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A picture by an object's networks: python examples/picture_of_an_object.py OUT.png [OBJECTFILE]."""
+"""Render an object with its networks: python examples/picture_of_an_object.py OUT.png [OBJECTFILE]."""
 
 import sys
 from pathlib import Path

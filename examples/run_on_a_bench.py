@@ -1,4 +1,4 @@
-"""A run on the mocked bench, estimated again and compared: python examples/run_on_a_bench.py FOLDER."""
+"""Run on the mocked bench, replay the run and compare it: python examples/run_on_a_bench.py FOLDER."""
 
 import sys
 from pathlib import Path

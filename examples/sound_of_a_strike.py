@@ -1,4 +1,4 @@
-"""The sound of a strike: python examples/sound_of_a_strike.py OUT.wav [OBJECTFILE]."""
+"""Render the sound of a strike: python examples/sound_of_a_strike.py OUT.wav [OBJECTFILE]."""
 
 import sys
 from pathlib import Path

@@ -60,7 +60,7 @@ COMMANDS = {
     ),
     "run": Command(
         "harness.commands.run.run:run",
-        "Run an experiment on a bench; with --resume, go on where one stopped.",
+        "Run an experiment on a bench, or resume a run with --resume.",
     ),
     "replay": Command(
         "harness.commands.run.replay:replay", "Estimate again from a recording alone; no bench is opened."

@@ -13,9 +13,7 @@ if TYPE_CHECKING:
 
 Contact = Annotated[
     places.Coordinates | None,
-    typer.Option(
-        help="Where it is pressed, in the object's frame: metres, or each with its unit.", metavar="X Y Z"
-    ),
+    typer.Option(help="Pressed point in the object's frame: metres, or each with its unit.", metavar="X Y Z"),
 ]
 Depth = Annotated[
     str | None,
@@ -55,22 +53,22 @@ Force = Annotated[
     bool,
     typer.Option(
         "--force",
-        help="How hard the gel is pressed as well, in N, with its error: docs/explanation/touch_force.md.",
+        help="Compute the force in N with its error as well: docs/explanation/touch_force.md.",
     ),
 ]
 Modulus = Annotated[
     str | None,
     typer.Option(
         "--gel-modulus",
-        help="Young's modulus of the gel, as 0.2MPa. Left out: 0.255MPa give or take 53 %, for nobody has "
-        "published this gel's. Forces go as it.",
+        help="Young's modulus of the gel, e.g. 0.2MPa; 0.255MPa +- 53 % if left out, as no measurement of "
+        "this gel is published. Forces are proportional to it.",
         metavar="PRESSURE",
     ),
 ]
 ModulusError = Annotated[
     str | None,
     typer.Option(
-        "--gel-modulus-error", help="One standard deviation of --gel-modulus, as 5%.", metavar="SHARE"
+        "--gel-modulus-error", help="One standard deviation of --gel-modulus, e.g. 5%.", metavar="SHARE"
     ),
 ]
 Poisson = Annotated[
@@ -80,12 +78,12 @@ Poisson = Annotated[
 Table = Annotated[
     Path | None,
     typer.Option(
-        "--force-table", help="Forces measured on this gel, in place of its modulus.", metavar="FILE.json"
+        "--force-table", help="Forces measured on this gel, instead of its modulus.", metavar="FILE.json"
     ),
 ]
 PressureOut = Annotated[
     Path | None,
-    typer.Option("--pressure-out", help="Pascals of every pixel.", metavar="FILE.npy"),
+    typer.Option("--pressure-out", help="File for the pressure in Pa of every pixel.", metavar="FILE.npy"),
 ]
 
 
@@ -141,8 +139,7 @@ def read_stiffness(
         raise WrongUse(f"{idle[0]} needs a force; add --force, or omit {idle[0]}")
     if (modulus is None) != (share is None):
         raise WrongUse(
-            "a modulus and how well it is known go together; say both, as --gel-modulus 0.2MPa "
-            "--gel-modulus-error 10%"
+            "a modulus needs its error; say both, e.g. --gel-modulus 0.2MPa --gel-modulus-error 10%"
         )
     gel = NOT_MEASURED
     if modulus is not None:

@@ -70,7 +70,7 @@ class Whole:
 
 
 def count_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
-    """Count from now on."""
+    """Count the calls of a function from now on."""
     found = Calls()
 
     def counted(module: object, name: str, count: Callable[..., None]) -> None:

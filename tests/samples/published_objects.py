@@ -34,7 +34,7 @@ def imported_object(
     tree: dict[str, Any], folder: Path, audio: Bounds | None = None, touch: Bounds | None = None
 ) -> PublishedObject:
     """Import a published file's tables with torch; bounds are those of version 1.0."""
-    from harness.authoring.published.imported import gathered
+    from harness.authoring.published.imported import gathered, write_parts
     from harness.authoring.published.layout import format_of
 
     kind = format_of(tree, "mug.pth")

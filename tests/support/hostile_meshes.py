@@ -136,7 +136,7 @@ def _zip_bomb(path: Path) -> None:
 
 
 def _text_bomb(start: str, repeated: str, count: int) -> Callable[[Path], Any]:
-    """Make a 3MF whose model repeats an element: kilobytes that unpack to megabytes."""
+    """Write a 3MF whose model repeats an element: kilobytes that unpack to megabytes."""
 
     def make(path: Path) -> None:
         begun, ended = model_xml("CUT", "").split("CUT")

@@ -1,4 +1,4 @@
-"""A page as its reader has it: words without tags, headings, tables, addresses."""
+"""The parts of an HTML page: text without tags, headings, tables, addresses."""
 
 import re
 from html.parser import HTMLParser
@@ -8,7 +8,7 @@ class Page(HTMLParser):
     """The parts of an HTML page.
 
     Args:
-        text: the file.
+        text: content of the file.
     """
 
     def __init__(self, text: str) -> None:
@@ -58,5 +58,5 @@ class Page(HTMLParser):
 
     @property
     def text(self) -> str:
-        """All words, in one line."""
+        """Text of the page in one line."""
         return re.sub(r"\s+", " ", " ".join(self._words))

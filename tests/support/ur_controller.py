@@ -1,6 +1,6 @@
 """A mocked UR controller in a process of its own: ``python -m tests.support.ur_controller --host 127.0.0.2``.
 
-It says ``{"ready": true, ...}`` on standard output when all ports listen. Each line of JSON on
+It prints ``{"ready": true, ...}`` on standard output when all ports listen. Each line of JSON on
 standard input, ``{"kind": "freeze", "seconds": 2}``, begins a fault (``mocks.ur.serve``) and is
 answered by one line; end of file ends the process.
 """

@@ -92,10 +92,10 @@ def run(
     ] = None,
     json: options.Json = False,
 ) -> int:
-    """Run an experiment on a bench; with --resume, go on where one stopped.
+    """Run an experiment on a bench, or resume a run with --resume.
 
     The motion is rehearsed in the twin before anything moves. Each contact is on the disk before the
-    next begins. Ctrl-C once ends after the contact; twice stops the arm.
+    next begins. The first Ctrl-C ends the run after the contact; the second stops the arm.
 
     Try: touchstone run contact-localization --station mock --scene scenes/mug_touch.toml
     """

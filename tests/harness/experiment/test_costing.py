@@ -1,4 +1,4 @@
-"""Answers of a cost curve are timed without the garbage collector."""
+"""The answers of a cost curve are timed without garbage collection."""
 
 import gc
 from collections.abc import Iterator

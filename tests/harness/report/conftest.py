@@ -1,4 +1,4 @@
-"""The page of a run that never was: each test gives the content."""
+"""Fixtures for the page of a run with contents that each test chooses."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -49,7 +49,7 @@ def poses(count: int) -> Reading:
 
 
 def stub_run(box: Any = BOX, mock: bool = True) -> RunFiles:
-    """What the page reads of a run's folder."""
+    """Write the files of a run's folder that the page reads."""
     readings = {FORCE: reading(FORCE, 4), PRESSURE: reading(PRESSURE, 3), "arm.joints": poses(70)}
     recording = SimpleNamespace(
         steps=lambda: [SimpleNamespace(readings=readings)] * 2,
@@ -121,7 +121,7 @@ class Stub:
 
 @pytest.fixture(scope="session")
 def text_of() -> Callable[[Stub, Path], str]:
-    """The words of a page, without its tags."""
+    """Return the text of a page without its tags."""
     from tests.support.pages import Page
 
     return lambda stub, folder: Page(stub.write(folder).read_text(encoding="utf-8")).text

@@ -1,4 +1,4 @@
-"""Rows of instruments and calibrations: samples counted as the box counts them, ages from dates."""
+"""Rows of instruments and calibrations: counts of samples, ages from dates."""
 
 import numpy as np
 

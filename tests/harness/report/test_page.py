@@ -1,4 +1,4 @@
-"""The page of a run shows what it is given, refers to nothing outside itself, and obeys no name."""
+"""The page of a run shows its inputs, refers to nothing outside itself, and escapes names."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""Keys of JSON in words: every leaf of a tree is a row, in a few digits, with the unit of its key."""
+"""Keys of JSON in words: every leaf of a tree is a row, with four digits and the unit of its key."""
 
 import pytest
 

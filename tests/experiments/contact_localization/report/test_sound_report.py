@@ -102,7 +102,7 @@ def heard_of(model: Model, strikes: tuple[Strike | None, ...]) -> tuple[Answer, 
 
 
 def blocks_of(made: ScoredContact, folder: Path) -> tuple[list[PageBlock], dict[str, list[PageBlock]]]:
-    """The blocks of the section, and those of its subsections by title."""
+    """Return the blocks of the section, and those of its subsections by title."""
     sides = object_sides(made.run.mesh, made.found.last.position_in_object, 40)
     pose = transform(frame_facing(np.array([0.0, 0.0, -1.0]), 0.3), POINTS[-1])
     blocks = list(show_senses(made, pose, sides, Album(folder)))
