@@ -378,7 +378,7 @@ def _press(
     table = fit.in_metres(pitch)
     if table is None:
         return None
-    drawn, taken = _shaded_press(pack, centre, light, table, pitch, ball)
+    drawn, taken = _render_press(pack, centre, light, table, pitch, ball)
     own = taken.max(axis=-1) >= OWN
     if own.sum() < LEAST_PIXELS:
         return None
@@ -386,7 +386,7 @@ def _press(
     return decibels(left - taken[own]), decibels(left), int(own.sum())
 
 
-def _shaded_press(
+def _render_press(
     pack: PressPack, centre: FloatArray, light: GelLight, table: ShadowTable, pitch: float, ball: float
 ) -> tuple[FloatArray, FloatArray]:
     """Render a press without its shadows, and the darkening by them, both in grey levels."""

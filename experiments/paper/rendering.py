@@ -89,7 +89,7 @@ def picture_scores(rendered: AnyArray, reference: AnyArray) -> dict[str, float]:
     return {"psnr_db": float(10.0 * np.log10(PEAK**2 / error)), "ssim": ssim(rendered, reference)}
 
 
-def grid_places(least: float, shape: tuple[int, int]) -> FloatArray:
+def grid_points(least: float, shape: tuple[int, int]) -> FloatArray:
     """Return the ``(rows * columns, 2)`` points of a grid by rows, from ``least`` to 1 along each axis."""
     rows, columns = (np.linspace(least, 1.0, size) for size in shape)
     return np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1).reshape(-1, 2)

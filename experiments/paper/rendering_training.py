@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from experiments.paper.hexahedra import is_within
 from experiments.paper.look import REACH, ViewBench, ball_of
-from experiments.paper.rendering import FieldSpec, FitSpec, grid_places
+from experiments.paper.rendering import FieldSpec, FitSpec, grid_points
 from experiments.paper.sound import (
     ANYWHERE,
     AUDIONET_EPOCHS,
@@ -196,7 +196,7 @@ def train_colours(bench: TouchBench, spec: FitSpec, report: Report) -> bytes:
     points = (places.nodes.points[chosen] - low) / (high - low)
     pictures = np.stack([bench.picture(each) for each in reference.maps[chosen]])
     colours = pictures.reshape(len(chosen), -1, 3)
-    pixels = grid_places(-1.0, (places.sensor.rows, places.sensor.columns))
+    pixels = grid_points(-1.0, (places.sensor.rows, places.sensor.columns))
 
     def draw(random: np.random.Generator) -> tuple[FloatArray, AnyArray, AnyArray]:
         place = random.integers(len(points), size=spec.batch)

@@ -24,7 +24,7 @@ from experiments.paper.rendering import (
     RenderingMethod,
     RenderingWork,
     Sense,
-    grid_places,
+    grid_points,
     train_network,
 )
 from harness.authoring.audio.audio import opened, waves_graph
@@ -169,7 +169,7 @@ class SpectrumBasis:
     @cached_property
     def places(self) -> FloatArray:
         """``(f t, 2)``: frequency and time of each bin, 0 to 1."""
-        return grid_places(0.0, self.bins)
+        return grid_points(0.0, self.bins)
 
     def spectrum(self, gains: AnyArray) -> AnyArray:
         """``(f, t)`` complex: of ``(m,)`` gains of the modes that are in it."""

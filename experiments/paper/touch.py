@@ -21,7 +21,7 @@ from experiments.paper.rendering import (
     RenderingMethod,
     RenderingWork,
     Sense,
-    grid_places,
+    grid_points,
     picture_scores,
     train_network,
 )
@@ -226,7 +226,7 @@ def first_touch(bench: TouchBench, work: RenderingWork, suffix: str = "") -> Ren
 
         def picture(number: int) -> ByteArray:
             point = (bench.presses.points[number] - low) / (high - low)
-            pixels = grid_places(-1.0, shape)
+            pixels = grid_points(-1.0, shape)
             rows = np.concatenate([np.broadcast_to(point, (len(pixels), 3)), pixels], axis=1)
             grey = np.clip(np.rint(127.5 * (network({"place": rows})["colours"] + 1.0)), 0.0, 255.0)
             return grey.astype(np.uint8).reshape(*shape, 3)

@@ -41,7 +41,7 @@ class ShapeReadings:
         """Take in a step: a look, a press, or one that was not made."""
         silhouette = self.run.silhouette(record)
         if silhouette is not None:
-            self.look = _seen_mask(self.run, silhouette)
+            self.look = _observe_silhouette(self.run, silhouette)
         elif "gel.image" in record.readings:
             try:
                 self.touches.append(_guarded_touch(self.run, record))
@@ -196,7 +196,7 @@ def _guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
     )
 
 
-def _seen_mask(run: RunFiles, mask: BoolArray) -> SeenMask | None:
+def _observe_silhouette(run: RunFiles, mask: BoolArray) -> SeenMask | None:
     """Return the silhouette as evidence; None if the object is not in the camera image."""
     camera, settings = run.station.camera, run.scene.section(ShapeRun)
     assert camera is not None  # there are its pictures

@@ -117,12 +117,12 @@ def _values(result: JsonObject) -> Iterator[AnswerValue]:
 
 def _surface(answer: ShapeAnswer, truth: Mesh | None, album: Album) -> tuple[PageBlock, ...]:
     found, evidence = answer.fused, answer.evidence
-    shown = _shown(found, evidence)
+    shown = _show_surface(found, evidence)
     contacts, ended = len(evidence.contacts), len(evidence.ended_by_housing)
     nothing = len(evidence.distinct) - contacts - ended
     caption = (
-        f"The surface from all readings: {_counted(contacts, 'contact')} (white); dotted, "
-        f"{_counted(ended, 'probe line')} that the sensor's housing ended and {nothing} without contact. "
+        f"The surface from all readings: {_count(contacts, 'contact')} (white); dotted, "
+        f"{_count(ended, 'probe line')} that the sensor's housing ended and {nothing} without contact. "
         "Surface that is neither under a contact nor at the border of the silhouette is predicted by the "
         "prior. The colour is the standard deviation of the surface along its normal."
     )
@@ -137,11 +137,11 @@ def _surface(answer: ShapeAnswer, truth: Mesh | None, album: Album) -> tuple[Pag
     )
 
 
-def _counted(count: int, noun: str) -> str:
+def _count(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def _shown(estimate: ShapeEstimate, evidence: ShapeEvidence) -> KnownSurface:
+def _show_surface(estimate: ShapeEstimate, evidence: ShapeEvidence) -> KnownSurface:
     """Return a picture of a surface with its readings."""
     touches = evidence.touches
     contacts = np.array([touch.points.mean(axis=0) for touch in touches if touch.met]).reshape(-1, 3)
@@ -165,7 +165,7 @@ def _strip(scored: ScoredShape, truth: Mesh | None, album: Album) -> CaptionedPi
         known = f"known to {1e3 * float(estimate.deviation.mean()):.1f} mm"
         if truth is not None:
             known += f", {1e3 * shape_error(estimate.mesh, truth, samples=_SAMPLES).chamfer:.1f} off"
-        shown.append(SurfaceThen(title, known, _shown(estimate, evidence)))
+        shown.append(SurfaceThen(title, known, _show_surface(estimate, evidence)))
     drawn = any(one.shown is not None for one in shown)
     readings = "presses" if answer.evidence.look is None else "the camera image and the presses"
     return CaptionedPicture(

@@ -126,15 +126,15 @@ def promise_share(point: Point, name: str | None, error: float) -> float:
 
 def smallest_promise(point: Point, name: str | None) -> float:
     """Return the smallest error in m that a setting promises to any of the runs like these, or infinity."""
-    return float(_promised_to_like(point, name).min(initial=np.inf))
+    return float(_find_bounds(point, name).min(initial=np.inf))
 
 
 def typical_promise(point: Point, name: str | None) -> float:
     """Metres promised to half of the runs like these, or infinity."""
-    found = _promised_to_like(point, name)
+    found = _find_bounds(point, name)
     return float(np.median(found)) if len(found) else float("inf")
 
 
-def _promised_to_like(point: Point, name: str | None) -> FloatArray:
+def _find_bounds(point: Point, name: str | None) -> FloatArray:
     limits, promised = promises(point)
     return np.append(promised, np.inf)[np.searchsorted(limits, doubts(point, like(point, name)))]

@@ -56,7 +56,7 @@ def answer_as_asked(experiment: AnyExperiment, files: RunFiles, front: Front, ta
     run.prepare(measured.finest)
     _, shared = run.read(measured.finest)
     finest = run.solve(measured.finest)
-    said, best = _described(asked.solved), _described(finest)
+    said, best = _describe(asked.solved), _describe(finest)
     ours, theirs = said["position_m"], best["position_m"]
     known = ours is not None and theirs is not None
     return {
@@ -85,7 +85,7 @@ def answer_as_asked(experiment: AnyExperiment, files: RunFiles, front: Front, ta
     }
 
 
-def _described(solved: AnySolved) -> JsonObject:
+def _describe(solved: AnySolved) -> JsonObject:
     error = None if solved.found is None else solved.error
     return {"position_m": solved.position, "error_m": error, "refused": solved.refusal}
 

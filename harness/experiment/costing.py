@@ -70,7 +70,7 @@ def measure(
     with workers_of(workers) as pool:
         for first in range(0, len(wanted), _ROUND):
             cells = wanted[first : first + _ROUND]
-            known = {cell: _kept(folder / f"{cell.name}.json", stamp) for cell in cells}
+            known = {cell: _load_points(folder / f"{cell.name}.json", stamp) for cell in cells}
             missing = [cell for cell, points in known.items() if points is None]
             name = measured.experiment.name
             with perform_cells(name, missing, scenes, station, pool, say) as runs:
@@ -167,7 +167,7 @@ def join_curves(experiment: AnyExperiment, old: Curve, new: Curve) -> Curve:
     return replace(merged, made=new.made, notes=new.notes)
 
 
-def _kept(path: Path, stamp: JsonObject) -> list[Point] | None:
+def _load_points(path: Path, stamp: JsonObject) -> list[Point] | None:
     """Return the points of a run measured before, by this machine, this code and for the same answers."""
     if not path.exists():
         return None

@@ -88,7 +88,7 @@ def write_run_page(
                 (
                     PageSection("Instruments", (list_instruments(run, health),)),
                     PageSection("Calibrations", (list_calibrations(run),)),
-                    PageSection("Simulated effects", tuple(_simulated(scored, comparison))),
+                    PageSection("Simulated effects", tuple(_list_effects(scored, comparison))),
                     PageSection("Differences of the mocked world", _world(experiment, scored)),
                     PageSection("Versions", (_versions(header.versions),)),
                 ),
@@ -192,7 +192,7 @@ def _age(run: RunFiles, date: str) -> str:
     return f"{age.total_seconds() / 86400.0:.0f} days"
 
 
-def _simulated(scored: AnyScored, comparison: Comparison) -> Iterator[PageBlock]:
+def _list_effects(scored: AnyScored, comparison: Comparison) -> Iterator[PageBlock]:
     networks = find_networks(scored)
     if networks:
         yield (
@@ -228,7 +228,7 @@ def _simulated(scored: AnyScored, comparison: Comparison) -> Iterator[PageBlock]
     if plan.skipped:
         left_out = [(step.effect.provides, step.reason) for step in plan.skipped]
         yield ReportTable(("effect left out", "reason"), left_out, "ll")
-    observed = [row for name, value in comparison.observed().items() for row in _observed(name, value)]
+    observed = [row for name, value in comparison.observed().items() for row in _list_quantities(name, value)]
     if observed:
         yield "Quantities that the scene observes, simulated at the answer."
         yield ReportTable(("quantity", "shape", "min", "mean", "max"), observed, "llrrr")
@@ -241,10 +241,10 @@ def find_networks(scored: AnyScored) -> tuple[NetworkInUse, ...]:
     return networks_at(scored.run.objectfile.description, scored.accuracy.levels)
 
 
-def _observed(name: str, described: JsonObject) -> Iterator[tuple[str, ...]]:
+def _list_quantities(name: str, described: JsonObject) -> Iterator[tuple[str, ...]]:
     if "parts" in described:
         for part, inner in described["parts"].items():
-            yield from _observed(f"{name}: {part}", inner)
+            yield from _list_quantities(f"{name}: {part}", inner)
     elif "shape" in described:
         shape = " x ".join(str(length) for length in described["shape"]) or "one number"
         values = (described.get(key) for key in ("least", "mean", "most"))

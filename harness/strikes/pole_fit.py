@@ -273,10 +273,10 @@ def new_poles(
     everything = np.sum(np.abs(lines.values) ** 2, axis=0)
     left = np.sum(power, axis=0)
     tops = tops[left[tops] > search.misfit * everything[tops]]
-    return _spread_out(lines, fit, left, tops[np.argsort(-left[tops])])
+    return _select_peaks(lines, fit, left, tops[np.argsort(-left[tops])])
 
 
-def _spread_out(
+def _select_peaks(
     lines: SpectralLines, fit: PoleFit, power: FloatArray, tops: AnyArray
 ) -> list[tuple[float, float]]:
     """Select the peaks that no stronger peak can explain, by its tail or as a poorly fitted mode."""

@@ -531,7 +531,7 @@ def _describe(
         colours_residual_rms_grey=header.residual_rms,
         table_colour_grey=colour_error(camera, calibration),
         maps_measured=press.maps_measured if pressed.touch is None else dict(pressed.touch.measured),
-        from_mesh=None if pressed.reference is None else _differ(press, pressed.reference),
+        from_mesh=None if pressed.reference is None else _compare_presses(press, pressed.reference),
     )
     return RenderedTouch(
         folder=None if pressed.of is None else pressed.of.folder,
@@ -573,7 +573,7 @@ def _describe(
     )
 
 
-def _differ(press: Press, reference: Press) -> MeshDifference:
+def _compare_presses(press: Press, reference: Press) -> MeshDifference:
     gap = np.abs(press.surface - reference.surface)
     forces = None
     if press.force is not None and reference.force is not None:

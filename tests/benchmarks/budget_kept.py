@@ -132,13 +132,13 @@ def _front(curve: Curve, cell: RunCell, run: Solver, reasons: Sequence[str]) -> 
 def _record(cell: RunCell, run: Solver, front: Front) -> dict[str, Any]:
     """One run: as asked for each budget and error, and at every setting."""
     tried = {point.name: sample_json(measure_sample(cell, run, point.levels)) for point in front.points}
-    budgets = [_asked(run, front, Target(seconds=budget)) for budget in BUDGETS]
-    errors = [_asked(run, front, Target(error=error)) for error in ERRORS]
+    budgets = [_answer(run, front, Target(seconds=budget)) for budget in BUDGETS]
+    errors = [_answer(run, front, Target(error=error)) for error in ERRORS]
     return {"object": run.object, "budgets": budgets, "errors": errors, "tried": tried}
 
 
-def _asked(run: Solver, front: Front, target: Target) -> dict[str, Any]:
-    refused = target.seconds is not None and not _foreseen(run, front, target.seconds)
+def _answer(run: Solver, front: Front, target: Target) -> dict[str, Any]:
+    refused = target.seconds is not None and not _is_accepted(run, front, target.seconds)
     found = ask(run, front, target)
     return {
         "asked": target.seconds if target.seconds is not None else target.error,
@@ -152,7 +152,7 @@ def _asked(run: Solver, front: Front, target: Target) -> dict[str, Any]:
     }
 
 
-def _foreseen(run: Solver, front: Front, seconds: float) -> bool:
+def _is_accepted(run: Solver, front: Front, seconds: float) -> bool:
     return for_budget(front.points, seconds, run.object, front.scale).fits
 
 

@@ -73,7 +73,7 @@ class SoundFit:
         return self.resonances >= _TELLING and self.unexplained > UNEXPLAINED * self.resonances
 
 
-def _fit_by_sound(search: Search, hypotheses: Hypotheses, heard: StrikeEvidence, count: int) -> SoundFit:
+def _fit_sound(search: Search, hypotheses: Hypotheses, heard: StrikeEvidence, count: int) -> SoundFit:
     """Measure the fit of the most probable hypothesis."""
     best = hypotheses.top
     points, directions = strike_places(search, heard.struck, best)
@@ -105,7 +105,7 @@ def judge_sound(
     Raises:
         FitRefused: places and sounds together cannot be of this object; naming the worst contact.
     """
-    fit = _fit_by_sound(search, hypotheses, heard, count)
+    fit = _fit_sound(search, hypotheses, heard, count)
     resonances = f"no mode explains {fit.unexplained} of the {fit.resonances} resonances heard"
     if fit.resonances == 0:
         resonances = "nothing was heard that speaks for it"

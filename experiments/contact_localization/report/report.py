@@ -279,7 +279,7 @@ def _contacts(
         else:
             facts += [f"error {millimetres(_error(after, true[k]))}"] if true is not None else []
             facts.append(f"90 % radius {millimetres(after.credible90, 1)}")
-        facts += [f"fit: {_fit(gate)}", *_expected(scored.run, k)]
+        facts += [f"fit: {_fit(gate)}", *_predict_error(scored.run, k)]
         tiles: dict[str, Picture | Missing] = {"live": album.pixels(f"contact_{k + 1}_live", png(live))}
         if isinstance(images[k], Missing):
             tiles["simulated"] = images[k]
@@ -317,7 +317,7 @@ def _fit(gate: Gate | None) -> str:
     return "no contact in the image" if gate.fit is None else f"log-likelihood {gate.fit:.1f}"
 
 
-def _expected(run: RunFiles, contact: int) -> Iterator[str]:
+def _predict_error(run: RunFiles, contact: int) -> Iterator[str]:
     """Yield the error that was predicted when a contact was chosen; nothing for planned contacts."""
     if run.scene.section(Localization).choose != "planned":
         error = run.recording.step(contact).step.parameters.get(EXPECTED)

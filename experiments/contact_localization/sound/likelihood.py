@@ -153,7 +153,7 @@ class SoundTerm:
         frequencies = np.array([peak.frequency for peak in self._peaks])
         self.scales: Scales = likely_scales(frequencies, modes.frequencies, noise)
         """frequency scales between object and model, most probable first."""
-        self._pairs = _pairs_of(frequencies, self._group_frequencies(), self.scales.factors, noise)
+        self._pairs = _find_groups(frequencies, self._group_frequencies(), self.scales.factors, noise)
         squares = self._table.mean_squares
         result = np.empty(len(squares))
         for a, b in zip(self._starts[:-1], self._starts[1:], strict=True):
@@ -392,7 +392,7 @@ def likely_scales(peaks: FloatArray, modes: FloatArray, noise: SoundNoise) -> Sc
     return Scales(np.exp(grid[chosen]), nats[chosen] - logsumexp(nats[chosen]))
 
 
-def _pairs_of(peaks: FloatArray, groups: FloatArray, factors: FloatArray, noise: SoundNoise) -> Pairs:
+def _find_groups(peaks: FloatArray, groups: FloatArray, factors: FloatArray, noise: SoundNoise) -> Pairs:
     """Find the groups of modes near each peak at each of ``(S,)`` frequency scales."""
     starts, found, shares = [0], [], []
     clutter = np.ones((len(factors), len(peaks)))

@@ -120,7 +120,7 @@ def train_completion(
     """
     last = amounts.shapes - round(HELD_OUT * amounts.shapes)
     learnt, held = samples.of(samples.shapes < last), samples.of(samples.shapes >= last)
-    module = _fitted_completion(name, make, learnt, amounts, seed, device)
+    module = _fit_completion(name, make, learnt, amounts, seed, device)
     card = {
         **described,
         "parameters": sum(value.numel() for value in module.parameters()),
@@ -149,7 +149,7 @@ _COARSE_COMPARED = 1024
 _SECONDS_BETWEEN_LINES = 20.0
 
 
-def _fitted_completion(
+def _fit_completion(
     name: str,
     make: Callable[[], Any],
     samples: CompletionSamples,

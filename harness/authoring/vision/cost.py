@@ -153,7 +153,7 @@ class Studio:
         return digest([*told, kept.apart])[:16]
 
 
-def measured(asked: Sequence[Way], studio: Studio, repeat: int, report: Report) -> tuple[PictureCost, ...]:
+def measure(asked: Sequence[Way], studio: Studio, repeat: int, report: Report) -> tuple[PictureCost, ...]:
     """Measure errors and seconds of each choice of levels, whose networks the studio has."""
     worth = []
     for number, way in enumerate(asked):

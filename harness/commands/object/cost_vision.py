@@ -54,7 +54,7 @@ def vision(
     Try: touchstone cost vision builtin:wrench --threads 1
     """
     options.require_folders(("--out", out))
-    from harness.authoring.vision.cost import Studio, measured
+    from harness.authoring.vision.cost import Studio, measure
     from harness.authoring.vision.data import held_out_pictures
     from harness.authoring.vision.profiles import vision_profile
     from harness.cost.curve import front
@@ -76,7 +76,7 @@ def vision(
         # Programs that ran or waited over the last minute, this one's single thread left out.
         load = max(os.getloadavg()[0] - 1.0, 0.0) if hasattr(os, "getloadavg") else None
         cores = threads or own_cores()
-        costs = measured(chosen, studio, repeat, report)
+        costs = measure(chosen, studio, repeat, report)
     of_size = [each.point for each in costs if each.way.side == size]
     best = front(of_size)
     title = f"{Path(mesh).name}, {size} x {size} pixels, {cores} threads"

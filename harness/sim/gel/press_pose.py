@@ -50,10 +50,10 @@ def contact_place(mesh: Mesh, asked: FloatArray) -> ContactPlace:
     point = np.asarray(asked, dtype=np.float64)
     if point.shape != (3,):
         raise WrongUse(f"a contact at {asked} is no place; give three finite numbers, x y z in metres")
-    return _contact_places(mesh, point[None])[0]
+    return _find_contacts(mesh, point[None])[0]
 
 
-def _contact_places(mesh: Mesh, points: FloatArray) -> tuple[ContactPlace, ...]:
+def _find_contacts(mesh: Mesh, points: FloatArray) -> tuple[ContactPlace, ...]:
     """Find the contact points of a surface nearest to ``(n, 3)`` points in m, as ``contact_place``."""
     for point in points:
         if not np.isfinite(point).all():
@@ -262,7 +262,7 @@ def presses_of(mesh: Mesh, gel_from_object: FloatArray) -> Presses:
             "presses no place of it; press elsewhere, or take touch.shapes = reference"
         )
     points = object_from_gel[:, :3, 3] + gaps[:, None] * object_from_gel[:, :3, 2]
-    normals = np.array([place.normal for place in _contact_places(mesh, points)]).reshape(-1, 3)
+    normals = np.array([place.normal for place in _find_contacts(mesh, points)]).reshape(-1, 3)
     leant = np.swapaxes(frames_facing(-normals), 1, 2) @ object_from_gel[:, :3, :3]
     across = np.hypot(leant[:, 0, 2], leant[:, 1, 2])
     tilts = np.arctan2(across, leant[:, 2, 2])

@@ -210,7 +210,7 @@ def curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra)
     way = np.zeros_like(mesh.nodes)
     way[: len(tetrahedra.nodes)] = tetrahedra.nodes - undeformed.nodes
     way[len(tetrahedra.nodes) :] = middles_of(way, mesh.cells, len(way))[len(tetrahedra.nodes) :]
-    moved = _straightened(QuadraticMesh(mesh.nodes + way, mesh.cells, mesh.faces))
+    moved = _straighten(QuadraticMesh(mesh.nodes + way, mesh.cells, mesh.faces))
     if least_determinant(moved).min() <= 0.0:
         raise MeshRefused("the deformation turns an element inside out; deform the object less")
     return moved
@@ -278,7 +278,7 @@ def snapped(mesh: QuadraticMesh, surface: Mesh) -> QuadraticMesh:
     return mesh
 
 
-def _straightened(mesh: QuadraticMesh) -> QuadraticMesh:
+def _straighten(mesh: QuadraticMesh) -> QuadraticMesh:
     """Straighten inverted cells: corners stay, middle nodes move to the midpoints of their edges."""
     corners = int(mesh.cells[:, :4].max()) + 1
     straight = _with_middles(mesh, mesh.nodes, corners)

@@ -181,7 +181,7 @@ def _oriented(nodes: FloatArray, cells: IntArray) -> tuple[QuadraticMesh, tuple[
             "the stiffness would lose its digits; collapse them, or mesh the object again"
         )
     if cells.shape[1] == 10:
-        cells = _ordered_middles(nodes, cells, said)
+        cells = _order_middle_nodes(nodes, cells, said)
         _check_shared(cells)
     reversed_ = signed_volumes(nodes, cells) < 0.0
     order = _REVERSED[: cells.shape[1]]
@@ -235,7 +235,7 @@ def _check_overlap(cells: IntArray, reversed_: BoolArray) -> None:
     )
 
 
-def _ordered_middles(nodes: FloatArray, cells: IntArray, said: list[str]) -> IntArray:
+def _order_middle_nodes(nodes: FloatArray, cells: IntArray, said: list[str]) -> IntArray:
     """Ten-node cells with each middle node on its own edge.
 
     Formats differ in the order of the middle nodes. Where a node is far from its edge and one

@@ -53,7 +53,7 @@ class AnsweredRun:
     seconds: float  #: of CPU, of readings and answer.
 
 
-def answered(cell: RunCell, run: ContactRun) -> Iterator[AnsweredRun]:
+def answer_run(cell: RunCell, run: ContactRun) -> Iterator[AnsweredRun]:
     """A run at every choice of levels, by every sense."""
     true, spacing = run.true, cell.conditions["spacing"]
     assert true is not None
@@ -79,7 +79,7 @@ def answered_objects(named: Sequence[str], seeds: range, rows: Path | None) -> l
         for cell in measured.cells([scene.object.name], seeds, conditions(*SPACINGS, sense="both")):
             if (cell.object, cell.seed, cell.conditions["spacing"]) not in there:
                 with open_run(EXPERIMENT, cell, cell.create_scene(scene), station) as files:
-                    new = list(answered(cell, measured.solver(files, cell)))
+                    new = list(answer_run(cell, measured.solver(files, cell)))
                 found += new
                 _append(rows, new)
                 console.print(f"{cell.name} answered")

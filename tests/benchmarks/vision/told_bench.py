@@ -66,7 +66,7 @@ def main() -> None:
         perform_cells(EXPERIMENT.name, wanted, scenes, station, pool, _say) as runs,
     ):
         scored = [
-            _scored(cell, measured.solver(files, cell), SENSES[given.senses]) for cell, files in runs.items()
+            _score(cell, measured.solver(files, cell), SENSES[given.senses]) for cell, files in runs.items()
         ]
     table = Table(
         "told", "mm", "modulo symmetry", title=f"{len(scored)} runs, {given.spacing}, {given.senses}"
@@ -81,7 +81,7 @@ def _say(line: str) -> None:
     sys.stderr.write(line + "\n")
 
 
-def _scored(cell: RunCell, run: ContactRun, senses: Senses) -> dict[str, tuple[float, float]]:
+def _score(cell: RunCell, run: ContactRun, senses: Senses) -> dict[str, tuple[float, float]]:
     """Metres, and metres modulo symmetry, by what is told; then what geometry alone makes of the poses."""
     model, draw = run.models.at({}), GapDraw(load_gap(cell.gap), cell.seed)
     symmetry, true = find_symmetries(model.mesh), run.true

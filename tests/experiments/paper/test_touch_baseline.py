@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.paper.rendering import FitSpec, RenderingWork, grid_places
+from experiments.paper.rendering import FitSpec, RenderingWork, grid_points
 from experiments.paper.touch import (
     MIDDLE,
     PressInputs,
@@ -66,7 +66,7 @@ def test_inputs_of_2_0_are_normalised_as_the_paper_does(bench: TouchBench) -> No
 
 
 def test_pixels_are_placed_row_by_row() -> None:
-    places = grid_places(-1.0, (2, 3))
+    places = grid_points(-1.0, (2, 3))
     assert places.tolist() == [[-1, -1], [-1, 0], [-1, 1], [1, -1], [1, 0], [1, 1]]
 
 

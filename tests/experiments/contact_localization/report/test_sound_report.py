@@ -94,7 +94,7 @@ def scored(model: Model, strikes: tuple[Strike | None, ...], asked: bool = True)
     return Scored(cast(Any, run), nothing, found, truth, accuracy, ())
 
 
-def heard_of(model: Model, strikes: tuple[Strike | None, ...]) -> tuple[Answer, StrikeEvidence]:
+def analyse_strikes(model: Model, strikes: tuple[Strike | None, ...]) -> tuple[Answer, StrikeEvidence]:
     made = scored(model, strikes)
     heard = gather_strikes(made)
     assert isinstance(heard, StrikeEvidence)
@@ -136,7 +136,7 @@ def test_without_a_truth_none_is_shown(model: Model, tmp_path: Path) -> None:
 
 
 def test_peaks_stand_beside_the_modes_that_made_them(model: Model, tmp_path: Path) -> None:
-    found, heard = heard_of(model, STRIKES)
+    found, heard = analyse_strikes(model, STRIKES)
     peaks, factor = match_peaks(found, heard), estimate_sound_scale(found, heard)
     assert not isinstance(peaks, Missing)
     assert factor == pytest.approx(SCALE, abs=0.012)
@@ -189,7 +189,7 @@ def test_every_strike_has_a_line_and_what_is_wrong_with_it(model: Model, tmp_pat
         replace(STRIKES[3], overload=True),
         silent(STRIKES[4]),
     )
-    found, heard = heard_of(model, damaged)
+    found, heard = analyse_strikes(model, damaged)
     sections = blocks_of(scored(model, damaged), tmp_path)[1]
     words, table, _ = sections["Strikes"]
     assert words == "1 of 5 strikes count."
@@ -214,7 +214,7 @@ def test_every_strike_has_a_line_and_what_is_wrong_with_it(model: Model, tmp_pat
 
 
 def test_the_spectrograms_are_of_the_last_strike_that_counts(model: Model) -> None:
-    pair = pair_spectrograms(*heard_of(model, (*STRIKES[:-1], silent(STRIKES[-1]))))
+    pair = pair_spectrograms(*analyse_strikes(model, (*STRIKES[:-1], silent(STRIKES[-1]))))
     assert not isinstance(pair, Missing)
     contact, recorded, simulated = pair
     assert contact == K - 1
@@ -222,7 +222,7 @@ def test_the_spectrograms_are_of_the_last_strike_that_counts(model: Model) -> No
     assert recorded.levels.shape == (len(recorded.frequencies), len(recorded.times))
     early = [shown.levels[:, :5].max(axis=1) for shown in (recorded, simulated)]
     assert np.corrcoef(*early)[0, 1] > 0.5
-    none = heard_of(model, tuple(silent(strike) for strike in STRIKES))
+    none = analyse_strikes(model, tuple(silent(strike) for strike in STRIKES))
     assert pair_spectrograms(*none) == Missing("no strike counts")
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from harness.authoring.vision.cells import CellTraining
-from harness.authoring.vision.cost import DEFAULT, Studio, Way, measured, ways
+from harness.authoring.vision.cost import DEFAULT, Studio, Way, measure, ways
 from harness.authoring.vision.data import held_out_pictures
 from harness.authoring.vision.profiles import CellsSpec
 from harness.basics.errors import DataRefused
@@ -55,7 +55,7 @@ def test_each_way_turns_one_knob_and_none_is_there_twice() -> None:
 
 
 def test_the_error_of_a_view_is_that_of_its_peak_signal_to_noise_ratio(studio: Studio) -> None:
-    (found,) = measured([PLAIN], studio, 2, unsaid)
+    (found,) = measure([PLAIN], studio, 2, unsaid)
     decibels = [20.0 * math.log10(255.0 / error) for error in found.point.errors]
     assert sum(decibels) / 2.0 == pytest.approx(found.worth.exact["psnr_db"])
     assert min(decibels) == pytest.approx(found.worth.exact["psnr_db_worst"])
