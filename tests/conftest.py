@@ -53,7 +53,7 @@ LONG: Final = (
 )
 """Groups that take longest: they begin first, so that none is left when the other workers have ended."""
 
-# Kernels are kept also by tests that have a cache of their own.
+# Kernels are also cached by tests with their own cache.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(default_folder() / "kernels"))
 
 # At Python's thresholds, garbage collection takes a fifth of the CPU time of collecting the tests.

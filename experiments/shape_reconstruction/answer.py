@@ -113,7 +113,7 @@ class ShapeAnswering:
             FitRefused: all readings together say too little.
         """
         evidence = self.readings.evidence()
-        # What each sense that the scene asks for has read.
+        # Readings of each sense that the scene uses.
         sensors, given = self.run.scene.sensors, {}
         if sensors.camera:
             given["vision"] = replace(evidence, touches=())

@@ -15,7 +15,7 @@ SHARED = 13
 
 
 POSITION = 0.5e-3
-"""m, one sigma of the object's place along each axis of the base."""
+"""Standard deviation in m of the object's position along each axis of the base frame."""
 
 
 def own_covariance(errors: BenchErrors) -> FloatArray:

@@ -25,7 +25,7 @@ class Convolution(nn.Module):
         self.normalisation = nn.BatchNorm2d(channels)
 
     def forward(self, given: Tensor) -> Tensor:
-        """``(n, channels, rows / stride, columns / stride)``."""
+        """Compute features ``(n, channels, rows / stride, columns / stride)``."""
         return self.normalisation(self.kernel(given))
 
     def write(self, nodes: Nodes, value: str) -> str:
@@ -51,7 +51,7 @@ class ResidualBlock(nn.Module):
         self.shortcut = Convolution(before, channels, 1, stride) if changes else None
 
     def forward(self, given: Tensor) -> Tensor:
-        """``(n, channels, rows / stride, columns / stride)``."""
+        """Compute features ``(n, channels, rows / stride, columns / stride)``."""
         along = given if self.shortcut is None else self.shortcut(given)
         return torch.relu(self.second(torch.relu(self.first(given))) + along)
 

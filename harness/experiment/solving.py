@@ -48,7 +48,7 @@ class Solved(Generic[Found_co]):
     refusal: str | None = None  #: reason of a refusal.
     position: Sequence[float] | None = None  #: m, ``(3,)``; None if the answer is no position.
     error: float | None = None
-    """m; None without a truth. A refused answer may have one: that of an answer without readings."""
+    """error in m; None without a truth. A refused answer may have the error of an answer without readings."""
 
 
 AnySolved: TypeAlias = Solved[object]

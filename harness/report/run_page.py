@@ -269,7 +269,7 @@ def _world(experiment: AnyExperiment, scored: AnyScored) -> tuple[PageBlock, ...
         known = "" if model.get(key) is None else format_key(key, model[key])[1]
         rows.append((name, number, unit, known))
     return (
-        "The mocked world was drawn for this run and differs from the estimator's model, which was not given "
+        "The mocked world was sampled for this run and differs from the estimator's model, which did not use "
         "these values.",
         ReportTable(("quantity", "world", "unit", "estimator's model"), rows, "lrlr"),
     )

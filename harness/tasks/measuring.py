@@ -206,7 +206,7 @@ class MeasuredTable(Result):
     found: Sequence[TableRow] = field(metadata=HIDDEN)  #: a method under a condition each.
     columns: Sequence[MeasuredColumn] = field(metadata=HIDDEN)  #: further means of the experiment.
     means: Mapping[Key, Mapping[str, Mapping[str, Mapping[str, float]]]] = field(metadata=HIDDEN)
-    """means in m by condition, value, object and method."""
+    """mean values in m by condition, value, object and method."""
     published: Mapping[str, Sequence[float]] = field(metadata=HIDDEN)  #: errors that the paper states, in cm.
     notes: tuple[str, ...] = field(metadata=HIDDEN)
 

@@ -87,7 +87,7 @@ def is_free(host: str, port: int) -> bool:
 
 
 PATIENCE = 30.0
-"""s after which a condition counts as never met: a busy computer makes processes late."""
+"""Time limit in s of a condition, long enough for a busy computer."""
 
 
 def wait_until(condition: Callable[[], bool], seconds: float = PATIENCE) -> None:

@@ -47,7 +47,7 @@ class ContactRun:
 
     @property
     def true(self) -> FloatArray | None:
-        """``(3,)`` m, the true last contact; None if it is unknown."""
+        """True position ``(3,)`` in m of the last contact; None if unknown."""
         return self.truth.get(len(self.observations) - 1)
 
     def first(self, steps: int) -> "ContactRun":

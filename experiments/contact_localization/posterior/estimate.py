@@ -151,7 +151,7 @@ _SUSPICIOUS_BELOW = -8.0
 
 
 USUAL_FIT = 2.6
-"""Twice the nats that a contact's own fit costs at the best hypothesis, on average over calibration runs."""
+"""Mean of a contact's fit at the best hypothesis over calibration runs, as -2 log-likelihood."""
 
 
 _SLIPPED = 40.0
@@ -159,7 +159,7 @@ _SLIPPED = 40.0
 
 
 STRAINED = 1.3
-"""Nuisance cost up to which errors are taken as stated."""
+"""Maximum nuisance-parameter cost at which the stated errors are used."""
 
 
 MOST = 2.0

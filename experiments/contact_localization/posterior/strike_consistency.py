@@ -21,7 +21,7 @@ from harness.recording.observation import Observation
 from harness.strikes.peaks import analyse
 
 UNEXPLAINED = 0.3
-"""Maximum share of the recorded resonances that no mode explains; above it the object may be another one."""
+"""Maximum fraction of the recorded resonances without a mode; above it the object may be another one."""
 
 
 STRANGER = 0.5
@@ -29,7 +29,7 @@ STRANGER = 0.5
 
 
 REFUSE_BELOW = -4.0
-"""Minimum log-likelihood of places and sound at the best hypothesis, without the worst contact's place."""
+"""Minimum log-likelihood of positions and sound at the best hypothesis, without the worst position."""
 
 
 REFUSE_UNHEARD_BELOW = -12.0

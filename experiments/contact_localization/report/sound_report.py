@@ -37,7 +37,7 @@ _EDGE = 0.1
 """Fraction of the greatest force; the hammer touches between the rise to it and the fall to it."""
 
 _MIN_WIDTH = 0.03
-"""m across the close-up of the object."""
+"""Width in m of the close-up of the object."""
 
 _CLOSE_UP_PIXELS = 460
 

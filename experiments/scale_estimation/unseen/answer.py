@@ -28,9 +28,9 @@ NOVEL_SIGMA = 0.35
 An arm's paths differ from those sampled for the training."""
 
 WIDER = MappingProxyType({"vision": 1.0, "audio": 4.0, "touch": 2.0})
-"""Factor on a sense's spread beside others, where the shape is not known. What each is off by is mostly of
-the shape, which they share, so that their product is surer than it should be; sound, which is off most,
-is off far beyond a normal density."""
+"""Factor on a sense's spread in the product of several senses, if the shape is unknown. The errors of the
+senses are correlated by the unknown shape, so that their product is too narrow. Sound has the largest errors,
+with far heavier tails than a normal density."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,7 +67,7 @@ def build_audio(
 ) -> BuiltAudio:
     """Build an object's sound, or continue a build that was stopped.
 
-    The folder ``out`` keeps its other modalities and its mesh; modes are kept in ``store``, so that a build
+    The folder ``out`` keeps its other modalities and its mesh; modes are cached in ``store``, so that a build
     that is repeated does not solve again.
 
     Raises:

@@ -48,9 +48,9 @@ class IntakeFinding:
     label_m: float | None = None  #: size in the catalogue; None if it has none.
     watertight: bool | None = None  #: whether the file's surface is closed.
     faces: int | None = field(default=None, metadata=JSON_ONLY)  #: number of faces of the surface.
-    wall_m: float | None = None  #: thickness that 98 % of the wall exceeds; None if open.
+    wall_m: float | None = None  #: wall thickness, exceeded on 98 % of the surface; None if open.
     mass_kg: float | None = None
-    """implied by volume and density; None where neither volume nor wall is known."""
+    """mass from volume and density; None if neither volume nor wall is known."""
 
 
 def units_of(row: CatalogueRow, mesh: str) -> str | None:

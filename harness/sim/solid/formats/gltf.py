@@ -350,7 +350,7 @@ class _Reader(GltfData):
             raise self.refuse(
                 f"{name} holds {len(at)} places for {len(part.vertices)} vertices, or no numbers"
             )
-        # Texture places after ``KHR_texture_transform``: scaled, turned counter-clockwise, then moved.
+        # Texture coordinates after ``KHR_texture_transform``: scaled, rotated counter-clockwise, then moved.
         scale = self.numbers(transform.get("scale", [1, 1]), 2, "a texture's scale")
         offset = self.numbers(transform.get("offset", [0, 0]), 2, "a texture's offset")
         angle = self.numbers([transform.get("rotation", 0)], 1, "a texture's rotation")[0]
