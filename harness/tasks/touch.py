@@ -361,7 +361,7 @@ class _Pressing:
     def heights(self, path: Path, of: str, under: Path | None) -> _Pressed:
         """Press a height map; ``under`` is the object's depth below a gel's surface."""
         if of not in ("object", "gel"):
-            raise WrongUse(f"--heights-of {of} is no kind of height map; use object or gel")
+            raise WrongUse(f"--heights-of {of} is no kind of height map; kinds are object and gel")
         kind: Heights = "object" if of == "object" else "gel"
         begun = time.perf_counter()
         given = read_heights(path, self.gel.sensor, kind)

@@ -229,7 +229,7 @@ def test_a_contact_that_fills_the_window_is_said(tmp_path: Path, capsys: pytest.
         (("--height", "h.npy", "--background", "small.png"), "not cropped", 1),
         (("--height", "h.npy", "--picture", "p.jpg"), ".png", 2),
         (("--height", "h.npy", "--picture", "a.png", "--out", "a.png"), "two names", 2),
-        (("--height", "h.npy", "--reached", "h.npy"), "says it already", 2),
+        (("--height", "h.npy", "--reached", "h.npy"), "includes the indentation", 2),
         (("--height", "h.npy", "--heights-of", "gel", "--reached", "mm.npy"), "look like millimetres", 1),
         (("builtin:mug", "--contact", "0", "0", "0", "--reached", "h.npy"), "are of --height", 2),
         (("--height", "h.npy", "--noise", "inf"), "finite", 2),
