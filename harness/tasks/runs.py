@@ -221,7 +221,7 @@ def _open_to_resume(
     ]
     if options:
         raise WrongUse(
-            f"--resume goes on with the run as it was planned; {', '.join(options)} cannot change it now: "
+            f"--resume continues the run as planned; {', '.join(options)} cannot change it now: "
             "leave them out, or start another run"
         )
     recording = Recording(folder)
@@ -412,13 +412,13 @@ def answer(run: str | Path, levels: Sequence[str] = ()) -> dict[str, Any]:
 
     Args:
         run: its folder.
-        levels: dials turned from their defaults, ``"localization.method=particle"``.
+        levels: levels of knobs, e.g. ``"localization.method=particle"``.
 
     Returns:
-        The result as ``result.json`` has it, without the report.
+        The keys of ``result.json``, without those of the report.
 
     Raises:
-        WrongUse: no run, a calibration's run, or an unknown dial.
+        WrongUse: no run, a calibration's run, or an unknown knob.
         RecordingDamaged: a step or a file of the run is damaged.
         FitRefused: nothing explains the readings.
     """

@@ -124,7 +124,7 @@ class RenderedVision(Result):
     pictures: tuple[Rendered, ...] = field(metadata=HIDDEN)
 
     def summary(self) -> tuple[str, ...]:
-        """State from where the object is seen."""
+        """State the position of the camera."""
         x, y, z = (f"{each * 1e3:.4g}" for each in self.camera.position_m)
         a, b, c = (f"{each:.3g}" for each in self.light.direction)
         return (
