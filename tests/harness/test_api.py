@@ -15,7 +15,7 @@ from nbclient import NotebookClient
 import touchstone
 from harness import api
 from harness.api import answer, tactile_image
-from harness.basics.errors import OutOfDomain, TouchstoneError, WrongUse
+from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.cli import invoke
 from harness.picture.image_file import write_png
 from tests.samples.drawn_presses import drawn_set
@@ -123,7 +123,7 @@ def test_every_function_is_shown_in_an_example() -> None:
     assert [name for name in FUNCTIONS if f"touchstone.{name}(" not in text] == []
 
 
-class _Called(TouchstoneError):
+class _Called(DataRefused):
     """The function of the API was called."""
 
 
