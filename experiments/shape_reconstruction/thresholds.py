@@ -42,7 +42,7 @@ UNDERSIDE_DEVIATION = 1.5e-3  # m: of the underside: feet, foot rings and hollow
 UNDERSIDE_HEIGHT = 5.0e-3  # m: above the support, below which neither gel nor camera reaches
 UNDERSIDE_NORMAL = -0.5  # z of a normal: below which a surface faces down
 
-# Known and bounded parts: family/estimate, smooth/knowledge
+# Known and bounded parts: family/estimate, smooth/free_space
 FAMILY_TOUCH_DISTANCE = 6.0e-3  # m: from a contact point within which the surface counts as touched
 TOUCH_DISTANCE = 5.0e-3  # m: the same of a smooth surface that faces alike
 BORDER_DISTANCE = 1.5  # pixels: from the border of the silhouette within which the surface counts as seen
@@ -78,7 +78,7 @@ MIN_PAIRED = 10  # points: with partners
 MIN_PAIRED_TOUCHES = 6  # contacts: with partners
 MAX_OPEN_ANGLE = float(np.radians(200.0))  # rad: without a point: a rounded corner is part of a circle too
 
-# Readings and presses: contact_points, explore/choosing, readings, smooth/free_space, smooth/grid
+# Readings and presses: answer, contact_points, explore/choosing, smooth/free_space, smooth/grid
 MIN_PIXELS = 12  # pixels: that a seen object covers
 MIN_EARLY_END = 2.0e-3  # m: before its end that a stopped way ends: more than the error of the arm
 MIN_INDENTATION = 0.12e-3  # m: of a touched gel
