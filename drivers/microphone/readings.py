@@ -25,7 +25,7 @@ from harness.bench.microphone_take import BAD, COUNT_BROKEN, OVERLOAD, readings_
 
 @dataclass(frozen=True)
 class Block:
-    """What one callback handed over."""
+    """The samples of one audio callback."""
 
     first: int  #: number of its first sample since the stream began.
     arrived: float  #: s on the bench clock, at the callback.
@@ -36,7 +36,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Format:
-    """How a microphone's bytes are read."""
+    """The sample format of a microphone's stream."""
 
     rate: int  #: samples a second, nominal.
     bits: int  #: 24 or 32, of one sample.
@@ -113,7 +113,7 @@ class Trigger:
         self._threshold = threshold
 
     def look(self) -> bool:
-        """Whether a sample has been found; ``index`` is its number."""
+        """Search the new blocks for a sample above the threshold; its number is then in ``index``."""
         for block in self._blocks.since(self._next):
             loud = np.flatnonzero(np.abs(self._form.counts(block.counts) - self._baseline) > self._threshold)
             self._next = block.first + self._form.block

@@ -158,7 +158,7 @@ ScoredShape: TypeAlias = Scored[ShapeAnswering, ShapeAnswer]
 
 
 def evidence_of(run: RunFiles, records: Iterable[StepRecord]) -> ShapeEvidence:
-    """What these steps of a run say."""
+    """Collect the evidence from steps of a run."""
     readings = ShapeReadings(run)
     for record in records:
         readings.read(record)

@@ -43,7 +43,7 @@ from harness.report.turned import turned_surface
 from harness.report.wording import millimetres, show_estimates, show_value
 
 _SAMPLES = 2000
-"""Samples on each surface, which determine an error to a tenth of a millimetre."""
+"""Number of samples on each surface; they determine an error to a tenth of a millimetre."""
 
 _FROM = {"fused": "from all readings", "vision": "from the camera image", "touch": "from touch"}
 

@@ -15,7 +15,7 @@ from harness.basics.arrays import AnyArray, FloatArray, read_only
 
 @dataclass(frozen=True)
 class Channel:
-    """What the numbers of a reading mean."""
+    """Name, unit, shape and frame of the values of a reading."""
 
     name: str  #: for example ``"gel.image"`` or ``"arm.joints"``.
     unit: str  #: SI symbol, ``"count"`` for pixels, ``"1"`` for pure numbers.
@@ -23,12 +23,12 @@ class Channel:
     dtype: str  #: of one sample, as numpy writes it.
     frame: str = ""  #: the frame the numbers are in, or ``""``.
     nominal_rate: float | None = None
-    """Hz, as the instrument's maker states it; never used to make time stamps."""
+    """Rate in Hz according to the manufacturer; never used to compute time stamps."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """Samples of one channel with a measured time each."""
+    """A block of samples of one channel, each with its measured time."""
 
     channel: Channel  #: what was read.
     times: FloatArray  #: ``(n,)`` s on the bench clock, measured on arrival, increasing.

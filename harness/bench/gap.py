@@ -21,19 +21,19 @@ class BenchErrors(StrictModel):
     """One standard deviation of everything that may be off at a bench."""
 
     yaw: Annotated[Angle, Positive] = float(np.radians(1.5))
-    """rad, of the object about the vertical, where a scene states it."""
+    """Rotation in rad of the object about the vertical, if a scene states its yaw."""
     tilt: Annotated[Angle, Positive] = float(np.radians(0.5))
-    """rad, of the object about base x and about base y."""
+    """Rotation in rad of the object about base x and about base y."""
     scale: Annotated[Ratio, Positive] = 0.005  #: of the object's true size over its model's, less 1.
     gel_centre: Annotated[Length, Positive] = 0.5e-3
-    """m, of the gel's centre along each axis of its own frame."""
+    """Displacement in m of the gel's centre along each axis of its own frame."""
     gel_tilt: Annotated[Angle, Positive] = float(np.radians(0.7))  #: rad, of the gel about its x and y each.
     gel_yaw: Annotated[Angle, Positive] = float(np.radians(1.0))  #: rad, of the gel's image about its z.
     arm: Annotated[Length, Positive] = 0.45e-3
-    """m, of each contact along each axis: the arm's pose, and the object's shape there."""
+    """Displacement in m of each contact along each axis: error of the arm's pose and of the local shape."""
     arm_tilt: Annotated[Angle, Positive] = float(np.radians(0.8))  #: rad, of each contact about each axis.
     gel_depth: Annotated[Length, Positive] = 0.064e-3
-    """m, root mean square over a contact, of the depth that the gel's picture gives."""
+    """Error in m (rms over a contact) of the depth from a tactile image."""
 
     def times(self, factor: float) -> "BenchErrors":
         """All of them so many times as large; ``factor`` is above 0."""
@@ -41,7 +41,7 @@ class BenchErrors(StrictModel):
 
 
 USUAL = BenchErrors()
-"""Of a bench that was set up with care: where a station states no others."""
+"""Errors of a carefully assembled bench, the default of a station."""
 
 
 _FOLDER = Path(__file__).parent / "gaps"

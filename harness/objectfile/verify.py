@@ -1,4 +1,4 @@
-"""Whether an ObjectFile is what it says: every file, every graph, every number that can be checked."""
+"""Verify an ObjectFile: every file, every graph, every number that can be checked."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -44,8 +44,8 @@ _AT_ONCE = 16
 _PRESSES = 16
 
 _PRESSES_AGREE = 0.2
-"""Of the gel's thickness, the median over presses of the root mean square difference of codes and mesh:
-codes beyond it know nothing of this object."""
+"""Largest median rms difference of codes and mesh over the presses, as a fraction of the gel's thickness:
+codes with a larger difference belong to another object."""
 
 _VIEWS = 3
 _PIXELS = 48

@@ -356,7 +356,7 @@ def add_arm(spec: Any, model: str) -> Any:
 
 
 def reaches(model: str, parts: list[Part]) -> FloatArray:
-    """How far from each joint's axis any point of each part can come, whatever the joints between do.
+    """Bound the distance of any point of each part from each joint's axis, over all joint angles between.
 
     Returns:
         ``(6, parts)`` m; 0 where the joint does not move the part. A part moves by no more

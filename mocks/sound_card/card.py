@@ -321,7 +321,7 @@ def _die_with_parent() -> None:
 
 
 NOISE = -110.0
-"""dB of full scale, rms: a converter of 24 bits as sound cards have them."""
+"""Noise level (rms) in dB of full scale, of a typical 24-bit converter."""
 
 
 @dataclass(frozen=True)
@@ -350,7 +350,7 @@ class CardConverter:
 
 
 AHEAD = 0.3
-"""s from when a strike is computed to when it begins: a sound card asks for its samples that early."""
+"""Time in s between the computation of a strike and its start: a sound card requests samples that early."""
 
 _WORD = 32
 _IDLE = 2.0
@@ -358,7 +358,7 @@ _IDLE = 2.0
 
 @dataclass(frozen=True)
 class Wire:
-    """How a sound card is wired."""
+    """The format and the scale of a sound card's input."""
 
     rate: int  #: samples a second.
     channels: int  #: of the card.
@@ -417,7 +417,7 @@ def start_microphone(_name: str, lab: LabBench) -> FarEnd:
 
 
 class StrikesOnCard(StrikesOnBox):
-    """Samples of inputs 0 and 1 of the hammer's box, while the card plays the microphone's sound.
+    """Inputs 0 and 1 of the hammer's box, while the card plays the microphone's sound.
 
     A strike begins on both at one scan of the box, ``AHEAD`` s after it was computed.
 

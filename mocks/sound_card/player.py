@@ -38,7 +38,7 @@ _LATE = b"!"
 
 
 class Queue:
-    """Samples that wait to be played."""
+    """A buffer of samples to play."""
 
     def __init__(self, rate: int, channels: int) -> None:
         self._rate = rate

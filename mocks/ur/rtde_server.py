@@ -62,7 +62,7 @@ def _elbow(c: Controller) -> Any:
 
 
 def _state() -> dict[str, Output]:
-    """What moves and what is felt."""
+    """Create the outputs of motion and force."""
     joints = Output("VECTOR6D", lambda c: c.robot.mover.joints)
     speeds = Output("VECTOR6D", lambda c: c.robot.mover.speeds)
     pose = Output("VECTOR6D", lambda c: poses.pose_from_matrix(c.robot.mover.base_from_tcp))
@@ -90,7 +90,7 @@ def _state() -> dict[str, Output]:
 
 
 def _modes() -> dict[str, Output]:
-    """What the controller says of itself."""
+    """Create the outputs of the controller's modes and status."""
     return {
         "robot_mode": Output("INT32", lambda c: int(c.robot.safety.power)),
         "joint_mode": Output(
@@ -118,7 +118,7 @@ def _modes() -> dict[str, Output]:
 
 
 def _constants() -> dict[str, Output]:
-    """What is not modelled."""
+    """Create the outputs that are constant because they are not modelled."""
     zeros = {
         "VECTOR6D": "target_current target_moment actual_current joint_control_output actual_current_window",
         "DOUBLE": "actual_execution_time actual_momentum standard_analog_input0 standard_analog_input1 "

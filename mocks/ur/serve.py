@@ -75,7 +75,7 @@ class Faults:
         self._until: float | None = None
 
     def begin(self, cue: Cue) -> str:
-        """What was begun, or why not, in words."""
+        """Begin a cue; return its description, or the reason for a refusal."""
         controller = self._controller
         match cue.kind:
             case "none":

@@ -23,7 +23,7 @@ _WAVES = 128
 
 @dataclass(frozen=True, eq=False)
 class ShapeDeviation:
-    """How a made object differs from its drawing.
+    """The deviation of a manufactured object from its CAD model.
 
     Each coordinate's deviation is a stationary Gaussian field with a squared-exponential
     covariance, sampled as random plane waves (Rahimi and Recht, Random Features for

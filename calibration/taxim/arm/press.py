@@ -315,7 +315,7 @@ class PressWatch:
 
 
 GAP = "target"
-"""Of a mocked bench, where no other is asked for: a ball on a rigid stand, a sensor not yet calibrated."""
+"""Default reality gap of a mocked bench: a ball on a rigid stand, and an uncalibrated sensor."""
 
 BALL = "ball"
 
@@ -345,7 +345,7 @@ def ball_scene(ball_radius: float, scene: SceneFile | None = None) -> SceneFile:
 
 
 def procedure(settings: PressSettings | None = None) -> Procedure:
-    """What the arm does: presses of the ball, and looks at the untouched gel between them.
+    """Create the procedure of the arm: presses of the ball, with images of the untouched gel between them.
 
     Args:
         settings: of presses that are still to be planned; None for a run that is planned.

@@ -21,7 +21,7 @@ from harness.basics.arrays import FloatArray, block_means
 from harness.bench.device import Reading, TactileCamera
 
 _BLOCK = 8
-"""Pixels: two grey levels of noise in each of them are half a level between two looks."""
+"""Side of a block in pixels: a noise of two grey levels per pixel is half a level between two images."""
 
 _SHARE = 99.5
 """Percentile of the blocks that must be at rest: a contact fills a fiftieth of the picture."""
@@ -41,7 +41,7 @@ class Stillness:
 
 @dataclass(frozen=True, eq=False)
 class Settling:
-    """How a picture came to rest."""
+    """The last images of a settling gel, and the changes between them."""
 
     frames: Reading  #: the last look.
     unrest: FloatArray  #: ``(n,)`` grey levels between each look and the one before.
@@ -186,5 +186,5 @@ def look(frames: Reading) -> FloatArray:
 
 
 def unrest_between(one: FloatArray, other: FloatArray) -> float:
-    """Grey levels by which all but one in two hundred blocks of two looks agree."""
+    """Return the difference in grey levels that 199 of 200 blocks of two images do not exceed."""
     return float(np.percentile(np.abs(block_means(other - one, _BLOCK)).max(axis=2), _SHARE))

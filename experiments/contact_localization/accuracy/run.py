@@ -115,7 +115,7 @@ def run_of(files: RunFiles) -> ContactRun:
 
 
 COARSE_SPACING = 8.0e-3
-"""Metres between the surface's samples: coarse, as counting must cost little compared with any answer."""
+"""Distance in m between the surface's samples: coarse, as counting must be fast compared with an answer."""
 
 _ALL = 10**9
 """Hypotheses: more than there are, so that none is left out of the count."""

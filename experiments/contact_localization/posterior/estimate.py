@@ -48,23 +48,24 @@ from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy, Knob, Setting
 
 Similarity = Callable[[int, IntArray, FloatArray], FloatArray | None]
-"""Of a contact's reading to what particles would read, from the contact's index, the particles' ``(n,)``
-samples and ``(n,)`` yaws: ``(n,)`` from -1 to 1; None for a contact that says nothing."""
+"""Similarity of a contact's reading to the readings predicted for particles. Arguments: index of the contact,
+``(n,)`` samples and ``(n,)`` yaws of the particles. Result: ``(n,)`` from -1 to 1, or None if the contact
+has no usable reading."""
 
 
 _BEHIND = 1.5e-3
-"""Metres behind the first surface at which a place cannot be touched, and its similarity is 0."""
+"""Distance in m behind the first surface beyond which a point cannot be touched; its similarity is 0."""
 
 
 CANDIDATES = 10
 
 
 _EVERY = 5
-"""Of the grid's yaws one in five: the filter's cosine hardly changes over 10 degrees."""
+"""Stride through the yaws of the grid: the filter's cosine hardly changes over 10 degrees."""
 
 
 TEMPERATURE = 0.05
-"""Of the weight ``exp(cosine / temperature)``; the paper states none, with 1 it hardly converges."""
+"""Temperature of the weight ``exp(cosine / temperature)``; the paper states none, and 1 hardly converges."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -250,10 +250,10 @@ class SharedNoise:
     scale: float = USUAL.scale  #: of the object's true size over its model's, less 1.
     gel_centre: float = USUAL.gel_centre  #: metres, of the gel's centre along each axis of its own frame.
     shift: float = USUAL.arm
-    """metres, left to each contact in the plane of the gel: the arm, and the shape there."""
+    """sigma in m of each contact in the plane of the gel: error of the arm and of the local shape."""
     depth: float = USUAL.arm  #: metres, the same across it.
     per_metre: float = 2.0e-3
-    """metres of sigma left for each metre between contacts: what a shape's error is not, a scale."""
+    """sigma in m per metre between contacts: errors of the shape that are not errors of its scale."""
 
 
 @dataclass(frozen=True)
@@ -348,11 +348,11 @@ def _geometry(noise: GeometryNoise, errors: BenchErrors, place: float, turn: flo
 
 
 SAME_PLACE = 1.5e-3
-"""Metres between two presses that count as one place."""
+"""Largest distance in m between two presses that count as one position."""
 
 
 SAME_AXIS = np.radians(4.0)
-"""rad between their tools."""
+"""Largest angle in rad between tool axes that count as equal."""
 
 
 def contact_scales(
@@ -386,7 +386,7 @@ def contact_scales(
 
 
 def place_noise(noise: Noise, named: bool) -> TouchNoise:
-    """Of the images; of the places what is each contact's own, where the shared errors are named."""
+    """Return the noise of the images, with position noise of each contact if shared errors are modelled."""
     if not named:
         return noise.touch
     return replace(noise.touch, shift=noise.shared.shift, depth=noise.shared.depth)

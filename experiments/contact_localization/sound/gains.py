@@ -248,7 +248,7 @@ def put_gains(
 
 MOST_RANK = 4
 MOST_NATS = 460.0
-"""What one peak may say at most, that products of densities stay within a double."""
+"""Largest log-likelihood of one peak, so that products of densities stay within a double."""
 
 _FLOOR = 1.0e-12
 _SIDE_BY_SIDE = 32

@@ -17,7 +17,7 @@ POINTS = 12
 """Places kept of a press."""
 
 SHARE = 0.5
-"""Of the deepest indentation: what lies deeper is the object's own surface, not gel that hangs from it."""
+"""Fraction of the greatest indentation; deeper pixels show the object, not the gel stretched beside it."""
 
 TOUCHED = 0.12e-3
 """M of indentation below which nothing was touched."""

@@ -38,18 +38,18 @@ from harness.experiment.subjects import REAL
 from harness.sim.solid.mesh_read import read_mesh
 
 READINGS = 8
-"""Of every thing as it stands, and as it lies."""
+"""Number of readings of each object, standing and lying."""
 
 SIGMAS = tuple(0.02 * k for k in range(26))
-"""Of the size's logarithm, that are tried."""
+"""Standard deviations of the logarithm of the size to compare."""
 
 _KINDS = ("*.obj", "*.stl", "*.ply")
 _LEAST = 6
 _FLAT = 0.8
-"""Of the height of a thing as it stands: one that is no lower when it lies is not laid down."""
+"""An object is only laid down if its height is then below this fraction of its standing height."""
 
 Reading = tuple[Belief, float]
-"""What a sense says of an object, and its size in m."""
+"""Estimate of one sense for an object, and the true size in m."""
 
 
 NETWORKS = ("sound", "touch", "imprints")

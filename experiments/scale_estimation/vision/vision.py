@@ -14,7 +14,7 @@ from harness.picture.camera_errors import CameraErrors
 from harness.picture.outline import DIRECTIONS, SeenOutline, directions
 
 PIXEL_SIGMA = 0.4
-"""Pixels, of where a mask's outermost pixel leaves the outline, and a model's shape it."""
+"""Standard deviation in pixels of the outline of a mask, and of the outline of a model."""
 
 ALIKE = 3.0
 """Directions that see one corner of the outline err together: so many count as one."""
@@ -34,7 +34,7 @@ UNKNOWNS = (
     *(f"the camera's turn about its {axis}" for axis in "xyz"),
     *("the focal length", "the support's height"),
 )
-"""What is fitted, in order."""
+"""Names of the fitted parameters, in order."""
 
 _UNKNOWNS = len(UNKNOWNS)
 _NUDGE = 1.0e-6

@@ -19,7 +19,7 @@ SPACING = 6.0e-3
 """Smallest distance between samples that face the same way, m."""
 
 MOST = 260
-"""Samples: a surface through them is solved in a tenth of a second."""
+"""Largest number of samples: a surface through them is solved in a tenth of a second."""
 
 _WIDER = 1.25
 

@@ -15,10 +15,10 @@ from harness.basics.errors import OutOfDomain
 from harness.basics.mesh import Mesh
 
 _NUDGE = 1e-3
-"""Of a cell: no corner is nearer to the surface, so that no face is without area."""
+"""Smallest distance of a corner from the surface as a fraction of a cell: no face has zero area."""
 
 _UNEVEN = 1e-4
-"""Of a cell, by which corners differ from what was given: a saddle between equal corners has no one side."""
+"""Perturbation of the corners as a fraction of a cell: a saddle between equal corners is ambiguous."""
 
 
 MOST_CORNERS = 200_000

@@ -42,7 +42,7 @@ _NEAR = 0.02
 
 @dataclass(frozen=True, eq=False)
 class AudioRequest(PartRequest):
-    """What is to be built, by a profile of ``profiles.PROFILES``."""
+    """Settings of the audio part to build, by a profile of ``profiles.PROFILES``."""
 
     limit: float = HEARING  #: Hz, modes up to there.
     most: int = MODES  #: modes at most, the lowest.
@@ -58,8 +58,8 @@ class BuiltAudio:
     audio: AuthoredAudio  #: its network and errors.
     said: tuple[str, ...]  #: what was done to the mesh and what to look at.
     seconds: Mapping[str, float]
-    """s of each of ``STAGES`` (``solve.timed``). Where modes were kept from an earlier solution,
-    ``"mesh"``, ``"assemble"`` and ``"solve"`` are what they took then."""
+    """Duration of each of ``STAGES`` in s (``solve.timed``). If modes were stored by an earlier solution,
+    ``"mesh"``, ``"assemble"`` and ``"solve"`` are the durations of that solution."""
 
 
 def build_audio(

@@ -179,7 +179,7 @@ class CellLessons:
         return encoded
 
     def _told(self, at: IntArray) -> AnyArray:
-        """What places with lamps of their own tell the later layer; nothing where lamps are drawn anew."""
+        """Return the input of the second layer from points with fixed lights; empty if lights are sampled."""
         size, lessons = self._size, self._lessons
         if not lessons.lamps.shape[1]:
             return np.empty((len(at), 0), np.float32)

@@ -38,7 +38,7 @@ _EXTRAS = 4
 
 
 class Lesson(NamedTuple):
-    """What one network learns from; n places."""
+    """Training samples of one network at n points."""
 
     encoded: AnyArray  #: ``(n, 3 + 6 octaves)``.
     told: AnyArray

@@ -18,7 +18,7 @@ Meeting = tuple[float, float, float]
 """Distance along the ray, and the weights of the triangle's second and third corner."""
 
 ON_EDGE = 1e-9
-"""Share of a triangle by which it is widened, so that no ray falls between two that share an edge."""
+"""Relative margin of a triangle, so that no ray passes between two triangles that share an edge."""
 
 
 Grid = tuple[FloatArray, float, IntArray, IntArray, IntArray]
@@ -199,7 +199,7 @@ def nearest(
     triangles: FloatArray,
     grid: Grid,
 ) -> Hit:
-    """What one ray meets first farther than ``least`` m; the face -1 where that is nothing.
+    """Find the first face that a ray hits beyond ``least`` m; face -1 if there is none.
 
     Cells are walked in the ray's order (Amanatides and Woo, Eurographics 1987). Where a border is
     met is computed from its place each time, not summed up, so that long walks do not drift.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from harness.bench.station_file import Station
 
 MARGIN = 0.05
-"""s of sound kept beyond either end of the force: more than a sound card's latency."""
+"""Duration in s of sound stored before and after the force: longer than a sound card's latency."""
 
 
 class _SoundSection(InstrumentSection):

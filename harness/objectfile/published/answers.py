@@ -77,7 +77,7 @@ _REASONS = {
 
 
 COMPAT_SIZE = 256
-"""Pixels a side of the pictures of the published programs."""
+"""Width and height in pixels of the pictures of the published programs."""
 
 
 @dataclass(frozen=True)

@@ -42,13 +42,13 @@ _UNITS = {"depth_m": (1e3, "mm deep"), "volume_m3": (1e9, "mm^3 of the gel taken
 
 
 class ForceRow(StrictModel):
-    """What was measured at one depth."""
+    """Forces measured at one depth."""
 
     at: Above  #: metres, or cubic metres, by the table's ``of``.
     force_n: Above  #: N, mean of the readings.
     sigma_n: Above
-    """N, one standard deviation of a press from that mean: the scatter of repeated presses, with the force
-    sensor's own uncertainty."""
+    """Standard deviation in N of a press from that mean: scatter of repeated presses, and the uncertainty of
+    the force sensor."""
 
 
 class ForceTable(StrictModel):
@@ -75,7 +75,7 @@ class ForceTable(StrictModel):
         return self
 
     def at(self, measure: float) -> tuple[float, float]:
-        """N and its standard deviation; nothing pressed is no force, and known.
+        """Interpolate the force in N and its standard deviation; both are zero without indentation.
 
         Args:
             measure: metres or cubic metres, by ``of``.
@@ -95,7 +95,7 @@ class ForceTable(StrictModel):
         return float(PchipInterpolator(at, force)(measure)), float(np.interp(measure, at, sigma))
 
     def measure(self, depth: FloatArray, pitch: float) -> float:
-        """What the table goes by, of one press ``(rows, columns)`` metres."""
+        """Compute the table's abscissa from the ``(rows, columns)`` depths in m of one press."""
         return float(depth.max() if self.of == "depth_m" else depth.sum() * pitch**2)
 
 

@@ -22,10 +22,10 @@ from harness.bench.sensor import TactileSensor
 Clusters = tuple[FloatArray, IntArray, FloatArray, FloatArray]
 
 _SQUARE = 8
-"""Pixels to a side of the squares whose farthest depth is known."""
+"""Width in pixels of the squares whose greatest depth is stored."""
 
 ON_EDGE = 1e-7
-"""Pixels by which a triangle is widened, so that no line falls between two that share an edge."""
+"""Margin of a triangle in pixels, so that no line passes between two triangles that share an edge."""
 
 Corners = tuple[float, float, float, float, float, float]
 """x and y of three corners in pixels, from the least y to the greatest."""
@@ -297,7 +297,7 @@ def _facing(p: FloatArray, span: FloatArray, rows: int, columns: int, facing: Fl
 
 @compiled
 def _hidden(p: FloatArray, k: int, image: FloatArray, farthest: FloatArray) -> bool:
-    """Whether every pixel that a face may cover is known to have something nearer."""
+    """Test whether every pixel that a face may cover already has a nearer surface."""
     rows, columns = image.shape
     z_low = min(p[2, k], p[5, k], p[8, k])
     top = max(int(np.ceil(min(p[1, k], p[4, k], p[7, k]) - ON_EDGE)), 0)

@@ -82,7 +82,7 @@ class MarkerFile(StrictModel):
 
     @property
     def radius(self) -> float:
-        """Pixels, median over the dots."""
+        """Median over the dots in pixels."""
         return float(np.median([dot.radius_px for dot in self.dots]))
 
     def in_gel(self, pitch: float | None = None) -> FloatArray:

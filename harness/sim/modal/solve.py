@@ -29,14 +29,14 @@ _PER_MODE = 6
 """Vectors of the basis for each mode wanted: mostly four are enough."""
 
 _TOLERANCE = 1e-9
-"""Of a Ritz pair's residual against its own value."""
+"""Largest residual of a Ritz pair relative to its value."""
 
 _BEYOND = 1e-2
 """The same for the first mode beyond the limit, which only has to be known to be beyond."""
 
 _GROWTH = 1e6
-"""Of the pivots' size, up to which their signs are taken for those of the eigenvalues: the matrix
-that they belong to is then within about 1e-10 of the one asked about."""
+"""Largest growth of the pivots at which their signs count as those of the eigenvalues: the factorized
+matrix is then within about 1e-10 of the given matrix."""
 
 DENSE = 600
 """Unknowns up to which every mode of the system is computed at once."""
@@ -136,7 +136,7 @@ class _Lanczos:
     def _without(
         self, block: FloatArray, weighted: FloatArray, first: int = 0
     ) -> tuple[FloatArray, FloatArray]:
-        """What of a block is neither rigid motion nor in the basis from ``first`` on.
+        """Remove rigid motion, and the basis from ``first`` on, from a block.
 
         Returns:
             That, and ``(used - first, b)`` what was of the basis.
@@ -230,7 +230,7 @@ def wall(seconds: Mapping[str, float]) -> dict[str, float]:
 
 
 def cpu(seconds: Mapping[str, float]) -> dict[str, float]:
-    """Of the processor, by stage."""
+    """Return the CPU seconds by stage."""
     return {stage.removeprefix(CPU): took for stage, took in seconds.items() if stage.startswith(CPU)}
 
 

@@ -31,16 +31,16 @@ from harness.sim.optics.shading import normals_from_colour, shades
 from harness.sim.optics.tactile_calibration import ColourMisfit, TactileCalibration, with_background
 
 _RIDGE = 16.0
-"""Grey levels squared: as the inversion's own."""
+"""Variance in squared grey levels, as in the inversion."""
 
 _HELD = 0.98
-"""Share of the slope limit from which a slope was held there."""
+"""A slope above this fraction of the slope limit counts as clamped."""
 
 _DISTRUST = 0.1
 """Weight of slopes that are not trusted, as in the solve for the heights."""
 
 _NODES = 49
-"""Of the plane of normals, a side."""
+"""Number of nodes per side of the plane of normals."""
 
 _SOLVED = 80
 """Blocks along the longer side: errors of height are smooth, and a solve costs as the cube of this."""
@@ -51,12 +51,12 @@ _STRANGE = 2.0
 _WINDOW = 5
 
 _FLOOR = 0.05
-"""Pixels of height, one sigma, where the gel is at rest."""
+"""Standard deviation of the height in pixels where the gel is at rest."""
 
 
 @dataclass(frozen=True)
 class ColourError:
-    """What colours are off by."""
+    """Errors of the colours."""
 
     camera: float = 1.5  #: grey levels rms, from pixel to pixel.
     alike: float = 0.15

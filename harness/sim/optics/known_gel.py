@@ -191,7 +191,7 @@ def require_own(calibration: TactileCalibration, sensor: TactileSensor) -> None:
 
 
 def how_to_calibrate(sensor: TactileSensor) -> str:
-    """What to run for a calibration of a sensor that has none."""
+    """Return the command that calibrates a sensor without a calibration."""
     return (
         f"press a ball all over it and say `touchstone calibrate taxim PRESSES/ --ball-radius 2mm --pitch "
         f"{1e3 * sensor.pitch:g}mm`, which writes one of {sensor.rows} x {sensor.columns} pixels"

@@ -256,7 +256,7 @@ def lay_over(picture: ByteArray, by: Float32Array, drawn: ByteArray) -> None:
 
 
 SOFTNESS = 59e-6
-"""Metres, sigma of the blur of shadows: two pixels of the sensor of Taxim (Si and Yuan, 2022)."""
+"""sigma in m of the blur of shadows: two pixels of the sensor of Taxim (Si and Yuan, 2022)."""
 
 
 def darkening(
@@ -268,7 +268,7 @@ def darkening(
     table: ShadowTable,
     rest: FloatArray | None = None,
 ) -> tuple[Float32Array, FloatArray]:
-    """How much darker shadows make each picture.
+    """Compute the darkening of each image by shadows.
 
     A shadow only holds colours down, so it may work on rounded ones: rounding and clipping keep order.
 
@@ -327,7 +327,7 @@ def soft_shadows(
     table: ShadowTable,
     pitch: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """What ``cast_shadows`` takes from colours that are no picture's, blurred as ``darkening`` does.
+    """Compute the darkening of ``cast_shadows`` for unrounded colours, blurred as in ``darkening``.
 
     ``pitch`` in metres a pixel says how many pixels the blur is wide.
     """
@@ -344,7 +344,7 @@ def _blurred(taken: Float32Array, sigma: float) -> Float32Array:
 
 
 def _radius(sigma: float) -> int:
-    """Pixels to a side beyond which a blur has nothing: four sigma."""
+    """Half width of a blur in pixels: four sigma."""
     return max(1, int(4.0 * sigma + 0.5))
 
 

@@ -27,7 +27,7 @@ _ALIKE = np.cos(np.radians(1.0))
 """Cosine between normals above which two faces are of parallel planes."""
 
 _LIFT = 1e-9
-"""Of the diagonal, by which a ray starts inside its own face."""
+"""Distance from its own face at which a ray starts, as a fraction of the diagonal."""
 
 
 _CELLS_OF_WALL, _CELLS_OF_SIZE = 1.5, 1.0 / 60.0
@@ -168,7 +168,7 @@ def wall_thickness(mesh: Mesh, points: FloatArray, normals: FloatArray) -> Float
 
 
 def thin_wall(mesh: Mesh, share: float = 0.02) -> float:
-    """Metres of wall that all but ``share`` of the surface exceeds.
+    """Return the wall thickness in m that all but ``share`` of the surface exceeds.
 
     The very thinnest places are the roundings of rims, which say nothing of the wall.
     """
@@ -181,7 +181,7 @@ def thin_wall(mesh: Mesh, share: float = 0.02) -> float:
 
 
 def flat_share(mesh: Mesh) -> float:
-    """Share of a surface's area in planes of few directions: 1 for a box or a tray, near 0 for a ball.
+    """Return the fraction of a surface in planes of few directions: 1 for a box or a tray, near 0 for a ball.
 
     Of each direction counted the surface has a twentieth at least; a cylinder's side has none, nor have
     the narrow sides of a thin plate.

@@ -23,7 +23,7 @@ from harness.basics.compiled import compiled
 from harness.sim.sound.synthesis_kernels import MEMORY, TILE, block_counts, fill, largest_rest
 
 STRETCH = 16_500
-"""Samples of one transform, about: an eighth of three seconds."""
+"""Approximate number of samples of one transform: an eighth of three seconds."""
 
 _TOGETHER = 8
 """Stretches transformed together, in registers side by side."""
@@ -35,7 +35,7 @@ REACH = 13
 """Bins of a bell to each side of its nearest one."""
 
 _LONGER = 1.5
-"""Of a stretch, the samples of its transform, at least."""
+"""Smallest number of samples of a transform, as a multiple of the samples of its stretch."""
 
 _WIDTH = 1.6
 """Squared bins: a bell is ``exp(-x^2 / (4 width))`` at ``x`` bins from its middle. Wider ones have nearer
@@ -303,7 +303,7 @@ def missing(decays: FloatArray, stretch: int, length: int) -> FloatArray:
 
 
 def _stretch(samples: int) -> int:
-    """Samples of each transform but the last, which may have fewer; even."""
+    """Number of samples of each transform but the last, which may have fewer; even."""
     return 2 * -(-samples // (2 * max(1, round(samples / STRETCH))))
 
 

@@ -83,7 +83,7 @@ class Tokens:
         return word
 
     def comes(self, *texts: str) -> bool:
-        """Whether one of these comes next, as a word of the grammar."""
+        """Return whether the next token is one of these symbols or keywords."""
         return self.next.text in texts and self.next.kind in ("symbol", "keyword")
 
     def accept(self, text: str) -> bool:
@@ -104,7 +104,7 @@ class Tokens:
         return self.take_any().text
 
     def unexpected(self, wanted: str) -> ScriptError:
-        """What to raise where something else was wanted."""
+        """Create the error of an unexpected token."""
         return ScriptError(
             f"expected {wanted}, found '{self.next.text or 'the end of the text'}'", self.next.line
         )

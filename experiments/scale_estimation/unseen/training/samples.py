@@ -36,10 +36,10 @@ SOLVED_AT = 0.2
 SOLVED_OF = MATERIALS["ceramic"]
 
 MODES = 60
-"""That are solved. What is above them is continued at their spacing."""
+"""Number of solved modes; higher modes are extrapolated at the same spacing."""
 
 PLACES = 150
-"""Of the surface, that may be struck."""
+"""Number of surface points that may be struck."""
 
 _MICROPHONE = 0.5
 _SPACED_BY = 20
@@ -97,17 +97,17 @@ class RingingShape:
 
 
 RATE = 32e3
-"""Hz."""
+"""Sampling rate in Hz."""
 
 STRIKES = 3
 SPEED_ERROR = 0.04
-"""Of sqrt(E / density) and of the wall, relative: of all modes alike."""
+"""Relative error of sqrt(E / density) and of the wall thickness, common to all modes."""
 
 MODE_ERROR = 0.01
-"""Of each mode."""
+"""Relative error of the frequency of each mode."""
 
 EXCITED = (5.0e3, 12.0e3)
-"""Hz, up to which a hammer excites; by the tip and what it meets."""
+"""Range in Hz of the upper limit of a hammer's excitation; it depends on the tip and the surface."""
 
 REVERBERANT = (-18.0, 0.0)
 """DB of the room's sound against the direct."""

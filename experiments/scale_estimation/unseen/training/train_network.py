@@ -18,7 +18,7 @@ RATE = 2.0e-3
 DECAY = 1.0e-2
 BATCH = 256
 BLUR = 0.06
-"""Of the logarithm: how far about its true size a sample counts."""
+"""Standard deviation of the logarithm of the size over which a sample's target is spread."""
 
 
 Augment = Callable[[dict[str, Tensor], torch.Generator], dict[str, Tensor]]
@@ -161,7 +161,7 @@ def medians(shares: FloatArray) -> FloatArray:
 
 
 def held(shares: FloatArray, sizes: FloatArray) -> float:
-    """Share of the samples whose size is among the likeliest nine tenths of the density."""
+    """Return the fraction of the samples whose size is within the 90 % highest-density region."""
     step = MIDDLES[1] - MIDDLES[0]
     bins = np.clip(np.round((np.log(sizes) - MIDDLES[0]) / step).astype(int), 0, BINS - 1)
     own = shares[np.arange(len(shares)), bins]

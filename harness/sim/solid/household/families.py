@@ -56,7 +56,7 @@ class SolidGrid:
         return np.arange(self._count - len(rows), self._count).reshape(places.shape[:-1])
 
     def places(self, numbers: IntArray) -> FloatArray:
-        """``(..., 3)`` of nodes by their numbers."""
+        """Return the ``(..., 3)`` positions of nodes by their numbers."""
         return np.asarray(np.concatenate(self._nodes)[numbers])
 
     def add_block(self, numbers: IntArray) -> None:
