@@ -16,6 +16,7 @@ import numpy as np
 JsonValue: TypeAlias = bool | int | float | str | list["JsonValue"] | dict[str, "JsonValue"] | None
 
 _UNITS = {
+    "_m_per_s": (1.0, "m/s"),
     "_per_s": (1.0, "1/s"),
     "_share": (100.0, "%"),
     "_rad": (180.0 / math.pi, "deg"),
@@ -30,7 +31,7 @@ _UNITS = {
     "_ns": (1.0, "N s"),
     "_s": (1.0, "s"),
 }
-"""Suffix of a field to the factor and the unit of its text."""
+"""Factor and unit of the text by the suffix of a field; longer suffixes first."""
 
 HIDDEN: Mapping[str, bool] = {"text": False, "json": False}
 """Metadata of a field that is for Python alone: arrays of pixels, objects to compute with."""
@@ -129,18 +130,24 @@ def _shown(result: Result) -> Iterator[tuple[str, Any]]:
             yield item.name, vars(result)[item.name]
 
 
+def split_unit(name: str) -> tuple[str, float, str]:
+    """Split the name of a field into its label, and the factor and the unit of its text.
+
+    ``"edge_m"`` is ``("edge", 1e3, "mm")``.
+    """
+    suffix = next((suffix for suffix in _UNITS if name.endswith(suffix)), "")
+    return name.removesuffix(suffix).replace("_", " "), *_UNITS.get(suffix, (1.0, ""))
+
+
 def heading(name: str) -> tuple[str, str]:
     """Return the label and the unit of a field: ``"edge_m"`` is ``("edge", "mm")``."""
-    for suffix, (_, unit) in _UNITS.items():
-        if name.endswith(suffix):
-            return name.removesuffix(suffix).replace("_", " "), unit
-    return name.replace("_", " "), ""
+    label, _, unit = split_unit(name)
+    return label, unit
 
 
 def number_text(name: str, value: float, digits: int = 5) -> str:
     """Format a number of a field in the unit of its text, without the unit."""
-    factor = next((factor for suffix, (factor, _) in _UNITS.items() if name.endswith(suffix)), 1.0)
-    return f"{value * factor:.{digits}g}" if math.isfinite(value) else "none"
+    return f"{value * split_unit(name)[1]:.{digits}g}" if math.isfinite(value) else "none"
 
 
 def _text(name: str, value: Any) -> str:

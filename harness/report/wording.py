@@ -6,6 +6,7 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray
 from harness.basics.files.json_file import JsonObject
+from harness.basics.result import split_unit
 from harness.experiment.report_content import COUNT, AnswerValue
 
 NONE = "\N{EN DASH}"
@@ -39,18 +40,8 @@ def place(position: FloatArray) -> str:
     return f"({x:.1f}, {y:.1f}, {z:.1f})"
 
 
-_UNITS = {
-    "m_per_s": (1.0, "m/s"),
-    "per_s": (1.0, "1/s"),
-    "m": (1e3, "mm"),
-    "m2": (1e6, "mm²"),
-    "rad": (180.0 / np.pi, "°"),
-    "s": (1.0, "s"),
-    "hz": (1.0, "Hz"),
-    "db": (1.0, "dB"),
-    "pa": (1.0, "Pa"),
-}
-"""Units at the end of a key of JSON, each with the factor and the unit that it is shown in."""
+_TYPESET = {"deg": "\N{DEGREE SIGN}", "mm2": "mm²", "cm3": "cm³"}
+"""Units of text that a page shows with other characters."""
 
 _LONGEST = 4
 """Numbers of a list that are all shown; of a longer one its ends are."""
@@ -64,11 +55,12 @@ def format_key(key: str, value: object) -> tuple[str, str, str]:
 
     Args:
         key: key that ends with its unit, e.g. ``"gel_centre_m"``; dots separate the levels of a tree.
-        value: a number, a text or a list of numbers.
+        value: a number, a text, or a list of either.
     """
-    suffix = next((suffix for suffix in _UNITS if key.endswith(f"_{suffix}")), "")
-    factor, unit = _UNITS.get(suffix, (1.0, ""))
-    name = key.removesuffix(f"_{suffix}").replace(".", ": ").replace("_", " ")
+    label, factor, unit = split_unit(key)
+    name, unit = label.replace(".", ": "), _TYPESET.get(unit, unit)
+    if isinstance(value, list) and not all(isinstance(item, int | float) for item in value):
+        return name, ", ".join(format_key(key, item)[1] for item in value), unit
     if isinstance(value, list) and len(value) > _LONGEST:
         return name, f"{len(value)} values, from {factor * value[0]:.4g} to {factor * value[-1]:.4g}", unit
     if isinstance(value, list) and value:

@@ -23,6 +23,8 @@ def test_a_tree_of_values_is_a_row_for_each_leaf() -> None:
         ("extra_damping_per_s", 2.0, ("extra damping", "2", "1/s")),
         ("frequencies_hz", [1.0, 2.0, 3.0, 4.0, 5.5], ("frequencies", "5 values, from 1 to 5.5", "Hz")),
         ("is_round", True, ("is round", "yes", "")),
+        ("rooms", ["hall", "booth"], ("rooms", "hall, booth", "")),
+        ("speed_m_per_s", 0.25, ("speed", "0.25", "m/s")),
         ("calibration_sha256", "51732c5970f03ef9b5", ("calibration sha256", "51732c5970f0", "")),
     ],
 )
