@@ -242,9 +242,9 @@ class ShapeTable(ShapeMeasurement):
             DataRefused: the true surface is unknown, or ``[shape] pcn`` has no network that may be run.
             WrongUse: ``[shape] library`` is no folder, or contains no usable shape.
         """
-        asked = scene.section(ShapeRun)
-        networks = [] if asked.pcn is None else paper_completions(Path(asked.pcn))
-        shapes, left_out = ([], []) if asked.library is None else library_of(Path(asked.library))
+        section = scene.section(ShapeRun)
+        networks = [] if section.pcn is None else paper_completions(Path(section.pcn))
+        shapes, left_out = ([], []) if section.library is None else library_of(Path(section.library))
         own = cell.create_scene(scene)
         with open_run(self.experiment, cell, own, station, recordings) as run:
             truth = true_surface(run, read_truth(run.recording))

@@ -123,8 +123,10 @@ class Surfaces:
     prior: float  #: chi-square of twist, gain and skirt.
 
 
-def surface_residual(step: int, found: Surfaces, noise: SurfaceNoise, gross: float = 0.0) -> Residual:
-    """Compare a contact's surfaces; ``gross`` is the probability that the model's surface is an outlier."""
+def surface_residual(
+    step: int, found: Surfaces, noise: SurfaceNoise, outlier_probability: float = 0.0
+) -> Residual:
+    """Compare a contact's surfaces; the model's surface is an outlier with ``outlier_probability``."""
     gaps = (found.read - found.modelled)[found.compared]
     area = len(gaps) * found.pitch**2
     # So many patches of the contact are off independently of each other.
@@ -140,25 +142,25 @@ def surface_residual(step: int, found: Surfaces, noise: SurfaceNoise, gross: flo
         "prior_chi_square": found.prior,
     }
     clipped = np.minimum(gaps**2 / variances, noise.most**2)
-    chi_square = combine_chi_squares(dof * clipped.mean(axis=1) + found.prior, dof, gross)
+    chi_square = combine_chi_squares(dof * clipped.mean(axis=1) + found.prior, dof, outlier_probability)
     sides = SideBySide(found.read, found.modelled, "m")
     return Residual(step, "gel surface", chi_square, dof, numbers, sides)
 
 
-def combine_chi_squares(chi_squares: FloatArray, dof: float, gross: float = 0.0) -> float:
+def combine_chi_squares(chi_squares: FloatArray, dof: float, outlier_probability: float = 0.0) -> float:
     """Combine ``(s,)`` chi-squares of equally probable noises into one with their mean p-value.
 
-    ``gross`` is the probability of an outlier of any size.
+    ``outlier_probability`` is the probability of an outlier of any size.
     """
-    if len(chi_squares) == 1 and gross == 0.0:
+    if len(chi_squares) == 1 and outlier_probability == 0.0:
         return float(chi_squares[0])
-    probability = gross + (1.0 - gross) * float(chi2.sf(chi_squares, dof).mean())
+    probability = outlier_probability + (1.0 - outlier_probability) * float(chi2.sf(chi_squares, dof).mean())
     return float(chi2.isf(max(probability, _LEAST), dof))
 
 
-def count_residual(residuals: Sequence[Residual], gross: float) -> Residual:
-    """Test the number of contacts that do not fit, as ``-2 ln p``; ``gross`` as above."""
-    share = gross + (1.0 - gross) * _IMPROBABLE
+def count_residual(residuals: Sequence[Residual], outlier_probability: float) -> Residual:
+    """Test the number of contacts that do not fit, as ``-2 ln p``; ``outlier_probability`` as above."""
+    share = outlier_probability + (1.0 - outlier_probability) * _IMPROBABLE
     found = chi2.sf([one.chi_square for one in residuals], [one.dof for one in residuals])
     unlike = int(np.count_nonzero(found < share))
     probability = float(binom.sf(unlike - 1, len(residuals), share))

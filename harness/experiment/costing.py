@@ -31,18 +31,18 @@ _ROUND = 24
 """Runs performed side by side, then answered one at a time while nothing else runs."""
 
 
-Asked = Sequence[tuple[int, Setting]]
+AnswerList = Sequence[tuple[int, Setting]]
 """The answers that are measured on each run: the number of its first steps, and the setting."""
 
 
 def measure(
     measured: Measurement,
     wanted: Sequence[RunCell],
-    asked: Asked,
+    answers: AnswerList,
     scenes: Mapping[str, SceneFile],
     station: Station,
     folder: Path,
-    say: Callable[[str], None],
+    report: Callable[[str], None],
     workers: int = 1,
 ) -> Iterator[tuple[RunCell, list[Point]]]:
     """Perform and answer every run that has no current file; one file per run.
@@ -50,11 +50,11 @@ def measure(
     Args:
         measured: measurement of the experiment.
         wanted: the runs.
-        asked: steps and setting of each answer.
+        answers: steps and setting of each answer.
         scenes: scenes by object.
         station: a mocked station.
         folder: folder of the files; those of another machine or of other code are measured again.
-        say: function that receives the reason for each run that cannot be planned, performed or answered.
+        report: function that receives the reason for each run that cannot be planned, performed or answered.
         workers: number of processes that perform runs; this process measures the answers while they are idle.
 
     Yields:
@@ -65,7 +65,7 @@ def measure(
         "schema": _SCHEMA,
         "machine": machine(),
         "sha256": code(measured.estimator)["sha256"],
-        "work": {"asked": [[count, dict(setting)] for count, setting in asked]},
+        "work": {"asked": [[count, dict(setting)] for count, setting in answers]},
     }
     with workers_of(workers) as pool:
         for first in range(0, len(wanted), _ROUND):
@@ -73,30 +73,30 @@ def measure(
             known = {cell: _load_points(folder / f"{cell.name}.json", stamp) for cell in cells}
             missing = [cell for cell, points in known.items() if points is None]
             name = measured.experiment.name
-            with perform_cells(name, missing, scenes, station, pool, say) as runs:
+            with perform_cells(name, missing, scenes, station, pool, report) as runs:
                 for cell in cells:
                     points = known[cell]
                     if points is None:
                         files = runs.pop(cell, None)  # its pictures are released once it is answered
-                        points = [] if files is None else _measure(measured, cell, files, asked, say)
+                        points = [] if files is None else _measure(measured, cell, files, answers, report)
                         tree = {**stamp, "points": [_point_json(point) for point in points]}
                         write_text_whole(folder / f"{cell.name}.json", json.dumps(tree, allow_nan=False))
                     yield cell, points
 
 
 def _measure(
-    measured: Measurement, cell: RunCell, files: RunFiles, asked: Asked, say: Callable[[str], None]
+    measured: Measurement, cell: RunCell, files: RunFiles, answers: AnswerList, report: Callable[[str], None]
 ) -> list[Point]:
     points = []
     try:
         solver = measured.solver(files, cell)
-        for count, setting in asked:
+        for count, setting in answers:
             if count <= files.recording.committed:
                 condition: dict[str, Level] = {**cell.conditions, measured.experiment.plural: count}
                 sample = measure_sample(cell, solver.first(count), setting)
                 points.append(Point(measured.setting_name(setting), setting, condition, (sample,)))
     except TouchstoneError as error:
-        say(f"{cell.name} was not answered: {error}")
+        report(f"{cell.name} was not answered: {error}")
         return []
     return points
 

@@ -320,7 +320,7 @@ def perform_cells(
     scenes: Mapping[str, SceneFile],
     station: Station,
     pool: Executor | None,
-    say: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> Iterator[dict[RunCell, RunFiles]]:
     """Perform runs in parallel if there is a pool; provide them until the context ends.
 
@@ -330,14 +330,14 @@ def perform_cells(
         scenes: scenes by object.
         station: a mocked station.
         pool: processes that perform the runs; None for this one.
-        say: function that receives the reason for each run that cannot be planned or performed.
+        report: function that receives the reason for each run that cannot be planned or performed.
     """
     with TemporaryDirectory(prefix="touchstone-runs-", ignore_cleanup_errors=True) as folder:
         trees = dump_scenes(scenes)
         perform = partial(_perform, name, trees, station, Path(folder))
         failed = {cell: why for cell, why in run_each(pool, perform, cells) if why is not None}
         for cell, why in failed.items():
-            say(f"{cell.name} was not performed: {why}")
+            report(f"{cell.name} was not performed: {why}")
         yield {cell: RunFiles(Recording(Path(folder) / cell.name)) for cell in cells if cell not in failed}
 
 

@@ -53,20 +53,20 @@ def _levels(
         WrongUse: a condition that the experiment does not have, or an unknown level.
     """
     known = {condition.name: condition for condition in measured.conditions}
-    asked: dict[str, list[str]] = {name: list(levels) for name, levels in given.items() if levels}
+    requested: dict[str, list[str]] = {name: list(levels) for name, levels in given.items() if levels}
     for text in where:
         name, equals, level = text.partition("=")
         if not equals:
             raise WrongUse(f"--where {text}: write NAME=LEVEL, as spacing=close")
-        asked.setdefault(name, []).append(level)
-    for name, levels in asked.items():
+        requested.setdefault(name, []).append(level)
+    for name, levels in requested.items():
         if name not in known:
             raise WrongUse(f"--{name}: not a condition of this experiment; {nearest(name, known)}")
         for level in levels:
             if level not in known[name].levels:
                 raise WrongUse(f"--{name} {level!r} is not known; {nearest(level, known[name].levels)}")
     return {
-        name: asked.get(name, list((condition.tabled if tabled else ()) or condition.usual))
+        name: requested.get(name, list((condition.tabled if tabled else ()) or condition.usual))
         for name, condition in known.items()
     }
 
@@ -145,11 +145,11 @@ def measure_cost(
         raise WrongUse(f"--gap {gap!r} is not known; {nearest(gap, ('default', 'none'))}")
     chosen = {**_levels(measured, levels or {}, where), "gap": [gap]}
     wanted = measured.cells(list(scenes), seeds, chosen)
-    asked = measured.list_answers(thorough, chosen, scenes, sorted(set(steps or measured.counts)))
+    answers = measured.list_answers(thorough, chosen, scenes, sorted(set(steps or measured.counts)))
     station, points = load_station(station_path("mock")), list[Point]()
     with hold_folder(out), progress(len(wanted)) as advance:
         for _, found in measure_costs(
-            measured, wanted, asked, scenes, station, out / "cells", warn, own_cores()
+            measured, wanted, answers, scenes, station, out / "cells", warn, own_cores()
         ):
             points += found
             advance()

@@ -31,7 +31,7 @@ from harness.cost.provenance import code, machine
 from harness.effects.accuracy import Accuracy, Level
 from harness.experiment.begin import begin, require_reachable
 from harness.experiment.budget import answer_as_asked, sentences
-from harness.experiment.costing import Asked, gather_curve, join_curves, measure
+from harness.experiment.costing import AnswerList, gather_curve, join_curves, measure
 from harness.experiment.front import Front, doubts, foresee, front_for, staleness
 from harness.experiment.in_process import RunCell
 from harness.experiment.measuring import measurement_of
@@ -337,7 +337,7 @@ def test_fewer_contacts_are_measured_at_few_settings(monkeypatch: pytest.MonkeyP
 def test_a_measurement_performs_once_answers_everywhere_and_resumes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: Asked = [(count, setting) for count in (2, 3) for setting in (COARSE, DEFAULT)]
+    asked: AnswerList = [(count, setting) for count in (2, 3) for setting in (COARSE, DEFAULT)]
     wanted = [ContactCell("wrench", "default", 5, "spread")]
 
     def measured() -> list[tuple[RunCell, list[Point]]]:

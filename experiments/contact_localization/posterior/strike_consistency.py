@@ -53,7 +53,7 @@ class SoundFit:
     places: FloatArray  #: ``(contacts,)`` nats of each contact's place and tool axis, 0 at best.
     yaw: float  #: nats of the object's yaw, 0 at best.
     sound: float  #: nats over a sound that says nothing.
-    resonances: int  #: how many were heard.
+    resonances: int  #: number of recorded resonances.
     unexplained: int  #: how many of them no mode explains.
 
     @property
@@ -73,39 +73,39 @@ class SoundFit:
         return self.resonances >= _TELLING and self.unexplained > UNEXPLAINED * self.resonances
 
 
-def _fit_sound(search: Search, hypotheses: Hypotheses, heard: StrikeEvidence, count: int) -> SoundFit:
+def _fit_sound(search: Search, hypotheses: Hypotheses, evidence: StrikeEvidence, count: int) -> SoundFit:
     """Measure the fit of the most probable hypothesis."""
     best = hypotheses.top
-    points, directions = strike_places(search, heard.struck, best)
-    rows = heard.term.mode_table(points[0], directions[0])
+    points, directions = strike_places(search, evidence.struck, best)
+    rows = evidence.term.mode_table(points[0], directions[0])
     return SoundFit(
         places=_places(search, best, count),
         yaw=float(search.log_yaw_prior(best.yaws)[0]),
-        sound=float(heard.nats(search, best)[0]),
+        sound=float(evidence.nats(search, best)[0]),
         resonances=len(rows),
         unexplained=sum(not row.modes for row in rows),
     )
 
 
 def judge_sound(
-    search: Search, hypotheses: Hypotheses, heard: StrikeEvidence, count: int, alone: bool
+    search: Search, hypotheses: Hypotheses, evidence: StrikeEvidence, count: int, alone: bool
 ) -> tuple[str, ...]:
     """State what a reader must know of an answer whose sound may be another object's; empty otherwise.
 
     Where the images fit, sound does not refuse: it warns. What the images of another object's like
-    curvature let pass is nearly always heard.
+    curvature let pass is nearly always recorded.
 
     Args:
         search: the run.
         hypotheses: the posterior.
-        heard: the run's strikes.
+        evidence: evidence of the run's strikes.
         count: contacts that count.
         alone: whether no image counts, so that a sound that cannot be of this object is refused.
 
     Raises:
         FitRefused: places and sounds together cannot be of this object; naming the worst contact.
     """
-    fit = _fit_sound(search, hypotheses, heard, count)
+    fit = _fit_sound(search, hypotheses, evidence, count)
     resonances = f"no mode explains {fit.unexplained} of the {fit.resonances} resonances heard"
     if fit.resonances == 0:
         resonances = "nothing was heard that speaks for it"

@@ -49,13 +49,13 @@ def gather_strikes(scored: ScoredContact) -> StrikeEvidence | Missing:
         return Missing("the scene called for no sound")
     if found.readings.model.sound_refusal:
         return Missing(found.readings.model.sound_refusal)
-    heard = hear(
+    strike_evidence = hear(
         [observation.strike for observation in found.readings.observations],
         found.readings.model,
         float(scored.accuracy[SPACING.name]),
         alone=not found.last.gates,
     )
-    return Missing("no contact was struck") if heard is None else heard
+    return Missing("no contact was struck") if strike_evidence is None else strike_evidence
 
 
 def show_senses(
@@ -69,9 +69,9 @@ def show_senses(
         sides: views of the object.
         album: album of the page.
     """
-    heard = gather_strikes(scored)
-    if isinstance(heard, Missing):
-        yield heard
+    strike_evidence = gather_strikes(scored)
+    if isinstance(strike_evidence, Missing):
+        yield strike_evidence
         return
     found, true = scored.found, true_points(scored)
     truth, by_sense = None if true is None else true[-1], found.by_sense
@@ -98,8 +98,8 @@ def show_senses(
     for sense, one in by_sense.items():
         if isinstance(one, FitRefused):
             yield Missing(f"no answer from {SENSES[sense]}: {one}")
-    yield PageSection("Strikes", tuple(_strikes(found, heard, album)))
-    yield PageSection("Peaks and modes", tuple(_peaks(found, heard)))
+    yield PageSection("Strikes", tuple(_strikes(found, strike_evidence, album)))
+    yield PageSection("Peaks and modes", tuple(_peaks(found, strike_evidence)))
 
 
 def posterior_of(estimate: Estimate) -> Posterior:
@@ -114,9 +114,9 @@ def posterior_of(estimate: Estimate) -> Posterior:
     )
 
 
-def _strikes(found: Answer, heard: StrikeEvidence, album: Album) -> Iterator[PageBlock]:
-    evidence = heard.term.evidence
-    reasons = dict(zip(heard.struck.tolist(), evidence.reasons, strict=True))
+def _strikes(found: Answer, strike_evidence: StrikeEvidence, album: Album) -> Iterator[PageBlock]:
+    evidence = strike_evidence.term.evidence
+    reasons = dict(zip(strike_evidence.struck.tolist(), evidence.reasons, strict=True))
     strikes = [observation.strike for observation in found.readings.observations]
     summary = f"{int(evidence.used.sum())} of {len(strikes)} strikes count"
     if evidence.band[1] > 0.0:
@@ -129,7 +129,7 @@ def _strikes(found: Answer, heard: StrikeEvidence, album: Album) -> Iterator[Pag
     ]
     headings = ("contact", "strike", "greatest force", "contact time", "greatest pressure")
     yield ReportTable(headings, rows, "llrrr")
-    pair = pair_spectrograms(found, heard)
+    pair = pair_spectrograms(found, strike_evidence)
     if isinstance(pair, Missing):
         yield pair
         return
@@ -184,25 +184,25 @@ def _until(falling: FloatArray, level: float) -> float:
 
 
 def pair_spectrograms(
-    found: Answer, heard: StrikeEvidence
+    found: Answer, strike_evidence: StrikeEvidence
 ) -> tuple[int, "Spectrogram", "Spectrogram"] | Missing:
     """Return the last contact with a usable strike, and its spectrograms as recorded and as modelled."""
-    counted = heard.struck[heard.term.evidence.used]
+    counted = strike_evidence.struck[strike_evidence.term.evidence.used]
     if not len(counted):
         return Missing("no strike counts")
     index = int(counted[-1])
     strike, model = found.readings.observations[index].strike, found.readings.model
     if strike is None or model.modes is None or model.material is None:
         return Missing("the object has no modes")
-    direction, factor = _directions(found, [index])[0], estimate_sound_scale(found, heard)
+    direction, factor = _directions(found, [index])[0], estimate_sound_scale(found, strike_evidence)
     point = found.last.contacts[index]
     return (index + 1, *sound_pair(strike, model.modes, model.material, point, direction, factor))
 
 
-def estimate_sound_scale(found: Answer, heard: StrikeEvidence) -> float:
+def estimate_sound_scale(found: Answer, strike_evidence: StrikeEvidence) -> float:
     """Estimate the ratio of the object's frequencies to the model's at the answer."""
-    struck = [int(k) for k in heard.struck]
-    return heard.term.scale_at(found.last.contacts[struck], _directions(found, struck))
+    struck = [int(k) for k in strike_evidence.struck]
+    return strike_evidence.term.scale_at(found.last.contacts[struck], _directions(found, struck))
 
 
 def _directions(found: Answer, contacts: Sequence[int]) -> FloatArray:
@@ -212,16 +212,18 @@ def _directions(found: Answer, contacts: Sequence[int]) -> FloatArray:
     return np.asarray(axes @ object_from_base.T)
 
 
-def match_peaks(found: Answer, heard: StrikeEvidence) -> tuple[ModeRow, ...] | Missing:
+def match_peaks(found: Answer, strike_evidence: StrikeEvidence) -> tuple[ModeRow, ...] | Missing:
     """Match the common resonances of the strikes to the modes at the answer."""
-    evidence = heard.term.evidence
+    evidence = strike_evidence.term.evidence
     if int(evidence.used.sum()) < 2:
         return Missing(
             "fewer than two strikes count, and one does not separate the object from room and microphone"
         )
     if not evidence.peaks:
         return Missing("the strikes have no resonance in common")
-    return heard.term.mode_table(found.last.contacts[heard.struck], _directions(found, heard.struck.tolist()))
+    return strike_evidence.term.mode_table(
+        found.last.contacts[strike_evidence.struck], _directions(found, strike_evidence.struck.tolist())
+    )
 
 
 _PEAK_HEADINGS = (
@@ -230,12 +232,12 @@ _PEAK_HEADINGS = (
 )
 
 
-def _peaks(found: Answer, heard: StrikeEvidence) -> Iterator[PageBlock]:
-    peaks, factor = match_peaks(found, heard), estimate_sound_scale(found, heard)
+def _peaks(found: Answer, strike_evidence: StrikeEvidence) -> Iterator[PageBlock]:
+    peaks, factor = match_peaks(found, strike_evidence), estimate_sound_scale(found, strike_evidence)
     if isinstance(peaks, Missing):
         yield peaks
         return
-    matched, rejected = sum(bool(peak.modes) for peak in peaks), len(heard.term.evidence.rejected)
+    matched, rejected = sum(bool(peak.modes) for peak in peaks), len(strike_evidence.term.evidence.rejected)
     yield (
         f"{len(peaks)} {'resonance' if len(peaks) == 1 else 'resonances'} in common, {matched} of them "
         "matched to modes"
@@ -248,7 +250,7 @@ def _peaks(found: Answer, heard: StrikeEvidence) -> Iterator[PageBlock]:
         "it with an uninformative peak; the weight accounts for errors that neighbouring peaks share. Bars "
         "are to scale; pale bars speak against the answer."
     )
-    weight = heard.term.weight
+    weight = strike_evidence.term.weight
     longest = max(abs(weight * peak.nats) for peak in peaks)
     yield ReportTable(
         (*_PEAK_HEADINGS, "log-likelihood ratio", ""),

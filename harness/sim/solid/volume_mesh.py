@@ -94,7 +94,7 @@ def read_volume(path: Path, units: str | None = None, up_axis: str | None = None
         return None
     cells = _cells(read, kinds, path.name)
     nodes = read.points
-    nodes, cells, number, said = _compacted(nodes, cells, path.name)
+    nodes, cells, number, notes = _compacted(nodes, cells, path.name)
     nodes, moved = move_near(nodes, cells, path.name, read.single)
     axis, rotated = choose_up_axis(up_axis, None)
     nodes = rotate_upright(nodes, axis)
@@ -114,7 +114,7 @@ def read_volume(path: Path, units: str | None = None, up_axis: str | None = None
         unit,
         bodies,
         quality,
-        (summary, *read.notes, *moved, *said, *done, *warned),
+        (summary, *read.notes, *moved, *notes, *done, *warned),
     )
 
 
@@ -166,13 +166,13 @@ def _compacted(
     number = np.full(len(nodes), -1)
     number[kept] = np.arange(len(kept))
     unused = len(nodes) - len(kept)
-    said = (f"{unused} nodes that no element holds are left out",) if unused else ()
-    return nodes[kept], number[cells], number, said
+    notes = (f"{unused} nodes that no element holds are left out",) if unused else ()
+    return nodes[kept], number[cells], number, notes
 
 
 def _oriented(nodes: FloatArray, cells: IntArray) -> tuple[QuadraticMesh, tuple[str, ...], float]:
     """Cells turned the right way and checked, and what was done."""
-    said: list[str] = []
+    notes: list[str] = []
     full = fullness(nodes, cells[:, :4])
     if full.min() < FLATTEST:
         raise MeshRefused(
@@ -181,22 +181,22 @@ def _oriented(nodes: FloatArray, cells: IntArray) -> tuple[QuadraticMesh, tuple[
             "the stiffness would lose its digits; collapse them, or mesh the object again"
         )
     if cells.shape[1] == 10:
-        cells = _order_middle_nodes(nodes, cells, said)
+        cells = _order_middle_nodes(nodes, cells, notes)
         _check_shared(cells)
     reversed_ = signed_volumes(nodes, cells) < 0.0
     order = _REVERSED[: cells.shape[1]]
     cells = np.where(reversed_[:, None], cells[:, order], cells)
     _check_overlap(cells, reversed_)
     if reversed_.any() and not reversed_.all():
-        said.append(f"{int(reversed_.sum())} elements were numbered the other way round and are turned")
+        notes.append(f"{int(reversed_.sum())} elements were numbered the other way round and are turned")
     if cells.shape[1] == 4:
         mesh = quadratic_mesh(nodes, cells)
         added = len(mesh.nodes) - len(nodes)
-        said.append(f"the cells have four nodes, too stiff to be solved; {added} middle nodes were added")
+        notes.append(f"the cells have four nodes, too stiff to be solved; {added} middle nodes were added")
     else:
         mesh = QuadraticMesh(nodes, cells, six_node_faces(cells))
-    quality = _check_curved(mesh, said)
-    return mesh, tuple(said), quality
+    quality = _check_curved(mesh, notes)
+    return mesh, tuple(notes), quality
 
 
 def _unit(asked: str | None, size: float, name: str) -> tuple[str, str]:
@@ -235,7 +235,7 @@ def _check_overlap(cells: IntArray, reversed_: BoolArray) -> None:
     )
 
 
-def _order_middle_nodes(nodes: FloatArray, cells: IntArray, said: list[str]) -> IntArray:
+def _order_middle_nodes(nodes: FloatArray, cells: IntArray, notes: list[str]) -> IntArray:
     """Ten-node cells with each middle node on its own edge.
 
     Formats differ in the order of the middle nodes. Where a node is far from its edge and one
@@ -264,7 +264,7 @@ def _order_middle_nodes(nodes: FloatArray, cells: IntArray, said: list[str]) -> 
             f"{named(bad)} of {len(cells)} have a middle node far from the middle of its edge; check the "
             "order of the nodes (corners 1 to 4, then edges 12 23 13 14 24 34), or mesh the object again"
         )
-    said.append(
+    notes.append(
         f"the middle nodes of the elements stood in the order {' '.join(str(5 + place) for place in likely)} "
         "instead of 5 6 7 8 9 10, and are put in order"
     )
@@ -286,7 +286,7 @@ def _check_shared(cells: IntArray) -> None:
         )
 
 
-def _check_curved(mesh: QuadraticMesh, said: list[str]) -> float:
+def _check_curved(mesh: QuadraticMesh, notes: list[str]) -> float:
     """Return the minimum quality of the cells; report poor cells, refuse inverted ones."""
     straight = 6.0 * signed_volumes(mesh.nodes, mesh.cells)
     share = least_determinant(mesh) / straight
@@ -299,7 +299,7 @@ def _check_curved(mesh: QuadraticMesh, said: list[str]) -> float:
     quality = REGULAR * fullness(mesh.nodes, mesh.cells) * np.minimum(share, 1.0)
     worst = float(quality.min())
     if worst < _POOR:
-        said.append(
+        notes.append(
             f"{named(quality < _POOR)} of {len(mesh.cells)} are nearly flat (the worst quality is "
             f"{worst:.1e}, a regular one's 1); they stiffen the mesh around them a little"
         )
@@ -312,16 +312,16 @@ def joints(mesh: QuadraticMesh) -> tuple[int, tuple[str, ...]]:
     ends = np.repeat(cells[:, :1], 3, axis=1).ravel(), cells[:, 1:].ravel()
     graph = coo_array((np.ones(len(ends[0])), ends), shape=(count, count))
     bodies = int(connected_components(graph, directed=False)[0])
-    said = []
+    notes = []
     if bodies > 1:
-        said.append(f"{bodies} separate bodies: each has six rigid motions, all left out")
+        notes.append(f"{bodies} separate bodies: each has six rigid motions, all left out")
         near = cKDTree(mesh.nodes).query_pairs(_COINCIDENT * float(np.ptp(mesh.nodes, axis=0).max()))
         if near:
-            said.append(f"{len(near)} pairs of nodes coincide: merge them if the bodies are to be one")
+            notes.append(f"{len(near)} pairs of nodes coincide: merge them if the bodies are to be one")
     hinged = joined_by_faces(cells) - bodies
     if hinged > 0:
-        said.append(
+        notes.append(
             f"{hinged} parts are joined to others at an edge or a point only: they may turn about it, and "
             "modes near 0 Hz are such turns"
         )
-    return bodies, tuple(said)
+    return bodies, tuple(notes)

@@ -96,9 +96,9 @@ def scored(model: Model, strikes: tuple[Strike | None, ...], asked: bool = True)
 
 def analyse_strikes(model: Model, strikes: tuple[Strike | None, ...]) -> tuple[Answer, StrikeEvidence]:
     made = scored(model, strikes)
-    heard = gather_strikes(made)
-    assert isinstance(heard, StrikeEvidence)
-    return made.found, heard
+    strike_evidence = gather_strikes(made)
+    assert isinstance(strike_evidence, StrikeEvidence)
+    return made.found, strike_evidence
 
 
 def blocks_of(made: ScoredContact, folder: Path) -> tuple[list[PageBlock], dict[str, list[PageBlock]]]:
@@ -136,8 +136,8 @@ def test_without_a_truth_none_is_shown(model: Model, tmp_path: Path) -> None:
 
 
 def test_peaks_stand_beside_the_modes_that_made_them(model: Model, tmp_path: Path) -> None:
-    found, heard = analyse_strikes(model, STRIKES)
-    peaks, factor = match_peaks(found, heard), estimate_sound_scale(found, heard)
+    found, strike_evidence = analyse_strikes(model, STRIKES)
+    peaks, factor = match_peaks(found, strike_evidence), estimate_sound_scale(found, strike_evidence)
     assert not isinstance(peaks, Missing)
     assert factor == pytest.approx(SCALE, abs=0.012)
     assert len(peaks) >= 6
@@ -147,8 +147,8 @@ def test_peaks_stand_beside_the_modes_that_made_them(model: Model, tmp_path: Pat
         assert peak.frequency == pytest.approx(true, rel=0.01)
         assert peak.frequency / peak.model_frequency == pytest.approx(1.0, abs=0.02)
         assert peak.model_damping > 0.0
-    assert sum(heard.term.weight * peak.nats for peak in peaks) > 0.0
-    band = heard.term.evidence.band
+    assert sum(strike_evidence.term.weight * peak.nats for peak in peaks) > 0.0
+    band = strike_evidence.term.evidence.band
     assert 0.0 < band[0] < peaks[0].frequency < peaks[-1].frequency < band[1]
     words, _, table = blocks_of(scored(model, STRIKES), tmp_path)[1]["Peaks and modes"]
     assert f"{len(peaks)} resonances in common, {len(peaks)} of them matched to modes" in str(words)
@@ -189,7 +189,7 @@ def test_every_strike_has_a_line_and_what_is_wrong_with_it(model: Model, tmp_pat
         replace(STRIKES[3], overload=True),
         silent(STRIKES[4]),
     )
-    found, heard = analyse_strikes(model, damaged)
+    found, strike_evidence = analyse_strikes(model, damaged)
     sections = blocks_of(scored(model, damaged), tmp_path)[1]
     words, table, _ = sections["Strikes"]
     assert words == "1 of 5 strikes count."
@@ -208,7 +208,7 @@ def test_every_strike_has_a_line_and_what_is_wrong_with_it(model: Model, tmp_pat
     (missing,) = sections["Peaks and modes"]
     assert isinstance(missing, Missing)
     assert "strikes" in missing.reason
-    pair = pair_spectrograms(found, heard)
+    pair = pair_spectrograms(found, strike_evidence)
     assert not isinstance(pair, Missing)
     assert pair[0] == 1
 
