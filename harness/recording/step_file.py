@@ -158,16 +158,18 @@ def _damaged(path: Path, why: str) -> RecordingDamaged:
 def _decoded(data: bytes, clock_offset_ns: int) -> StepRecord:
     reader = make_reader(BytesIO(data), validate_crcs=True)
     described = next(json.loads(m.metadata["json"]) for m in reader.iter_metadata())
-    grouped: dict[str, list[tuple[int, bytes]]] = {}
+    grouped: dict[tuple[str, str], list[tuple[int, bytes]]] = {}
     for _, source, message in reader.iter_messages(log_time_order=False):
-        grouped.setdefault(source.metadata["channel"], []).append((message.log_time, message.data))
+        key = source.metadata["channel"], source.message_encoding
+        grouped.setdefault(key, []).append((message.log_time, message.data))
     clock_offset_ns = int(described.get("clock_offset_ns", clock_offset_ns))
     step = Step(**described["step"])
     readings: dict[str, Reading] = {}
-    for text, samples in grouped.items():
+    for (text, encoding), samples in grouped.items():
         fields = json.loads(text)
         channel = Channel(**{**fields, "shape": tuple(fields["shape"])})
-        codec = codec_of(channel)
+        # Images of the bare bench were once written as JSON numbers.
+        codec = _NUMBERS if encoding == _NUMBERS.encoding else codec_of(channel)
         decoded: list[tuple[AnyArray, bytes]] = [codec.decode(data, channel) for _, data in samples]
         times = np.array([(wall_ns - clock_offset_ns) / 1e9 for wall_ns, _ in samples])
         encoded = tuple(data for _, data in decoded) if decoded[0][1] else ()
@@ -202,7 +204,7 @@ class Codec:
 
 def codec_of(channel: Channel) -> Codec:
     """The codec of a channel, by its name; JSON numbers where no well-known schema fits."""
-    if channel.name.endswith(".image"):
+    if channel.name.endswith((".image", ".bare")):
         return _IMAGE
     return _BY_NAME.get(channel.name, _NUMBERS)
 

@@ -18,6 +18,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.basics.errors import RecordingDamaged, WrongUse
+from harness.bench.device import Reading
+from harness.recording import step_file
+from harness.recording.observation import BARE_IMAGE, IMAGE
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step, StepRecord, read_step, write_step
 from tests.samples.recorded_step import OFFSET_NS, images, joints, poses, sample_header, wrenches
@@ -44,14 +47,29 @@ def test_numbers_read_back_to_the_bit(
         assert np.abs(again.times - reading.times).max() < 1e-9
 
 
-def test_an_image_is_recorded_as_the_jpeg_it_arrived_as(tmp_path: Path) -> None:
-    reading = images(3)
-    write_step(
-        tmp_path / "000.mcap", StepRecord(Step(0, "press", {}), {"gel.image": reading}, 0.0), OFFSET_NS
-    )
-    again = read_step(tmp_path / "000.mcap", OFFSET_NS).readings["gel.image"]
+@pytest.mark.parametrize("name", ["gel.image", IMAGE, BARE_IMAGE])
+def test_an_image_is_recorded_as_the_jpeg_it_arrived_as(tmp_path: Path, name: str) -> None:
+    reading = named(images(3), name)
+    write_step(tmp_path / "000.mcap", StepRecord(Step(0, "press", {}), {name: reading}, 0.0), OFFSET_NS)
+    again = read_step(tmp_path / "000.mcap", OFFSET_NS).readings[name]
     assert again.encoded == reading.encoded
     assert np.array_equal(again.values, reading.values)
+
+
+def test_an_image_of_the_bare_bench_that_was_written_as_numbers_still_reads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reading = named(images(1), BARE_IMAGE)
+    monkeypatch.setattr(step_file, "codec_of", lambda _: step_file._NUMBERS)
+    write_step(tmp_path / "000.mcap", StepRecord(Step(0, "look", {}), {BARE_IMAGE: reading}, 0.0), OFFSET_NS)
+    monkeypatch.undo()
+    again = read_step(tmp_path / "000.mcap", OFFSET_NS).readings[BARE_IMAGE]
+    assert np.array_equal(again.values, reading.values)
+    assert again.encoded == ()
+
+
+def named(reading: Reading, name: str) -> Reading:
+    return replace(reading, channel=replace(reading.channel, name=name))
 
 
 @pytest.mark.parametrize("side", [7_000, 30_000])
