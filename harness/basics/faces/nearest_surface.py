@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled, copy_line
 from harness.basics.faces.face_clusters import FaceGrid, build_face_grid
-from harness.basics.faces.nearest_kernels import nearest_on_triangle
+from harness.basics.faces.nearest_kernels import nearest_on_triangle, squared_gap
 from harness.basics.mesh import Mesh
 
 _SLACK = 1.0 + 1e-9
@@ -32,7 +32,7 @@ class NearestSurface:
         points = np.ascontiguousarray(points, dtype=np.float64)
         reach = np.asarray(self._corners.query(points)[0]) * _SLACK + np.finfo(float).tiny
         lists = (grid.origin, grid.cell, grid.shape, grid.starts, grid.faces)
-        return _nearest_faces(points, reach, self.mesh.corners, *lists)
+        return _nearest_faces(points, reach, self.mesh.corners, self._spheres, *lists)
 
     def distances(self, points: FloatArray) -> FloatArray:
         """``(n,)`` m from ``(n, 3)`` finite points."""
@@ -41,6 +41,15 @@ class NearestSurface:
     @cached_property
     def _grid(self) -> FaceGrid:
         return build_face_grid(self.mesh)
+
+    @cached_property
+    def _spheres(self) -> FloatArray:
+        """``(faces, 4)`` m, centre and radius of a sphere around each face, a rounding wider."""
+        corners = self.mesh.corners
+        centres = corners.mean(axis=1)
+        radii = np.sqrt(((corners - centres[:, None]) ** 2).sum(axis=2).max(axis=1))
+        rounding = 1e-12 * np.abs(corners).max(axis=(1, 2))
+        return np.column_stack([centres, radii * _SLACK + rounding])
 
     @cached_property
     def _corners(self) -> cKDTree:
@@ -52,17 +61,19 @@ def _nearest_faces(
     points: FloatArray,
     reach: FloatArray,
     corners: FloatArray,
+    spheres: FloatArray,
     origin: FloatArray,
     cell: float,
     shape: IntArray,
     starts: IntArray,
     faces: IntArray,
 ) -> tuple[FloatArray, IntArray]:
-    """Places and faces; cells that are farther than the best so far are passed over."""
+    """Places and faces; cells, and spheres around faces, beyond the best so far are passed over."""
     places, found = points.copy(), np.full(len(points), -1, np.int64)
     low, high, here = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3)
     for n in range(len(points)):
         best = reach[n] ** 2
+        within = reach[n] * _SLACK
         for axis in range(3):
             first = np.floor((points[n, axis] - reach[n] - origin[axis]) / cell)
             last = np.floor((points[n, axis] + reach[n] - origin[axis]) / cell)
@@ -81,9 +92,13 @@ def _nearest_faces(
                     if xy + _beyond(points[n, 2] - origin[2], k * cell, cell) > best:
                         continue
                     for at in range(starts[c], starts[c + 1]):
-                        gap = nearest_on_triangle(points[n], corners[faces[at]], here)
+                        f = faces[at]
+                        if squared_gap(points[n], spheres[f]) > (within + spheres[f, 3]) ** 2:
+                            continue
+                        gap = nearest_on_triangle(points[n], corners[f], here)
                         if gap <= best:
-                            best, found[n] = gap, faces[at]
+                            best, found[n] = gap, f
+                            within = np.sqrt(gap) * _SLACK
                             copy_line(places[n], here)
     return places, found
 
