@@ -1,4 +1,4 @@
-"""Array types, the promise that a result is not written to by its readers, and means over blocks."""
+"""Array types, the promise that a result is not written to by its readers, means over blocks, row keys."""
 
 from typing import Any, TypeVar
 
@@ -18,6 +18,25 @@ def read_only(array: _A) -> _A:
     """The same array, refusing to be written to."""
     array.setflags(write=False)
     return array
+
+
+def row_keys(rows: IntArray) -> IntArray:
+    """Encode rows of integers as one integer each: equal for equal rows, and in the order of the rows.
+
+    ``np.unique`` of the keys is many times faster than ``np.unique`` of the rows along an axis.
+
+    Args:
+        rows: ``(n, columns)``.
+    """
+    lowest = int(rows.min(initial=0))
+    size = int(rows.max(initial=0)) - lowest + 1
+    if size ** rows.shape[1] > np.iinfo(np.int64).max:
+        return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1), np.int64)
+    keys = np.zeros(len(rows), np.int64)
+    for column in rows.T:
+        keys *= size
+        keys += column.astype(np.int64) - lowest
+    return keys
 
 
 def block_means(picture: AnyArray, by: int) -> FloatArray:

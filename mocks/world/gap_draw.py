@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
+from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only, row_keys
 from harness.basics.geometry import rotation_about, rotation_from_vector, transform
 from harness.basics.mesh import Mesh
 from harness.bench.gap import Gap
@@ -242,10 +242,10 @@ def split_long_edges(mesh: Mesh, longest: float) -> Mesh:
 def _cut(vertices: FloatArray, edges: IntArray, long: BoolArray) -> tuple[FloatArray, IntArray]:
     """Vertices with the middles of long edges appended; ``(faces, 3)`` index of each edge's middle."""
     ends = np.sort(edges[long], axis=-1)
-    unique, which = np.unique(ends, axis=0, return_inverse=True)
+    _, first, which = np.unique(row_keys(ends), return_index=True, return_inverse=True)
     middles = np.full(long.shape, -1, dtype=np.int64)
     middles[long] = len(vertices) + which.ravel()
-    added = vertices[unique].mean(axis=1)
+    added = vertices[ends[first]].mean(axis=1)
     return np.concatenate([vertices, added]), middles
 
 

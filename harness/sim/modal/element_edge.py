@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.basics.arrays import BoolArray, FloatArray, IntArray, row_keys
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
 from harness.basics.store import Store
@@ -278,7 +278,8 @@ def _split(cut: _Cut, across: BoolArray) -> _Cut:
     All cells of an edge are cut at once, so that they still meet; what is left to cut is left for later.
     """
     ends = np.sort(cut.cells[:, EDGES], axis=2)
-    pairs, which = np.unique(ends[across], axis=0, return_inverse=True)
+    _, first_of_pair, which = np.unique(row_keys(ends[across]), return_index=True, return_inverse=True)
+    pairs = ends[across][first_of_pair]
     length = np.linalg.norm(cut.nodes[pairs[:, 0]] - cut.nodes[pairs[:, 1]], axis=1)
     place = np.empty(len(pairs), dtype=np.int64)
     place[np.argsort(-length, kind="stable")] = np.arange(len(pairs))

@@ -8,6 +8,7 @@ on blocks of pixels, since height errors are smooth. The standard deviation is t
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from time import process_time
 
 import numpy as np
@@ -136,9 +137,7 @@ class _Slopes:
         """One error of the slope, down and right, ``(blocks down, blocks right)`` each."""
         width = self._alike * 0.5 * (_NODES - 1)
         noise = gaussian_filter(rng.normal(size=(4, _NODES, _NODES)), (0.0, width, width), mode="wrap")
-        impulse = np.zeros((_NODES, _NODES))
-        impulse[_NODES // 2, _NODES // 2] = 1.0
-        noise /= np.sqrt(np.mean(gaussian_filter(impulse, width, mode="wrap") ** 2)) * _NODES
+        noise /= _smoothed_deviation(width)
         at = 0.5 * (self._normal.T + 1.0) * (_NODES - 1)
         fields = np.stack([map_coordinates(one, at, order=1, mode="nearest") for one in noise])
         colour = self._misfit * fields[:3] + rng.normal(0.0, self._camera, (3, len(self._flat)))
@@ -156,6 +155,14 @@ class _Slopes:
         picture = np.zeros(self._where.shape)
         picture[self._where] = values
         return picture
+
+
+@lru_cache(maxsize=8)
+def _smoothed_deviation(width: float) -> float:
+    """Return the standard deviation that noise of unit variance keeps when smoothed over ``width`` nodes."""
+    impulse = np.zeros((_NODES, _NODES))
+    impulse[_NODES // 2, _NODES // 2] = 1.0
+    return float(np.sqrt(np.mean(gaussian_filter(impulse, width, mode="wrap") ** 2)) * _NODES)
 
 
 _THICKEST = 5e-3

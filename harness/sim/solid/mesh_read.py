@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.arrays import FloatArray, IntArray, row_keys
 from harness.basics.errors import MeshRefused, WrongUse
 from harness.basics.files.foreign_file import MOST_DATA, require_readable
 from harness.basics.files.named_file import require_file
@@ -193,7 +193,7 @@ def _with_meshio(path: Path) -> RawMesh:
         # The faces that belong to one tetrahedron only.
         outward = cells[:, _TETRAHEDRON].reshape(-1, 3)
         corners = np.sort(outward, axis=1)
-        _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
+        _, first, count = np.unique(row_keys(corners), return_index=True, return_counts=True)
         faces = [outward[first[count == 1]]]
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points

@@ -12,7 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 from scipy.spatial import cKDTree
 
-from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.basics.arrays import BoolArray, FloatArray, IntArray, row_keys
 from harness.basics.faces.mesh_rays import is_inside, openness
 
 _WELD = 2e-6
@@ -86,7 +86,7 @@ def drop_duplicates(surface: RepairedSurface) -> None:
     the file holds a sheet drawn from both sides: one stays.
     """
     groups, first, inverse = np.unique(
-        np.sort(surface.faces, axis=1), axis=0, return_index=True, return_inverse=True
+        row_keys(np.sort(surface.faces, axis=1)), return_index=True, return_inverse=True
     )
     once = np.zeros(len(surface.faces), dtype=np.bool_)
     once[first] = True
@@ -156,7 +156,7 @@ def orient(surface: RepairedSurface) -> None:
 def boundary_edges(faces: IntArray) -> IntArray:
     """``(n, 2)`` directed edges that only one face uses."""
     directed = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    _, first, count = np.unique(np.sort(directed, axis=1), axis=0, return_index=True, return_counts=True)
+    _, first, count = np.unique(row_keys(np.sort(directed, axis=1)), return_index=True, return_counts=True)
     lonely: IntArray = directed[first[count == 1]]
     return lonely
 
@@ -164,7 +164,7 @@ def boundary_edges(faces: IntArray) -> IntArray:
 def is_watertight(faces: IntArray) -> bool:
     """Whether every edge joins two faces that agree on the outside."""
     directed = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    once = len(np.unique(directed, axis=0)) == len(directed)
+    once = len(np.unique(row_keys(directed))) == len(directed)
     return once and len(boundary_edges(faces)) == 0
 
 
@@ -189,7 +189,7 @@ def _consistent(surface: RepairedSurface) -> tuple[IntArray, BoolArray]:
     one, other = order[two], order[two + 1]
     same_way = directed[one, 0] == directed[other, 0]
     pairs = np.column_stack([owner[one], owner[other]])
-    disagree = {(int(a), int(b)): bool(s) for (a, b), s in zip(pairs, same_way, strict=True) if s}
+    disagree = {(int(a), int(b)) for a, b in pairs[same_way]}
     graph = _graph(pairs, count).tocsr()
     patch = connected_components(graph, directed=False)[1].astype(np.int64)
     flipped = np.zeros(count, dtype=np.bool_)
@@ -198,7 +198,7 @@ def _consistent(surface: RepairedSurface) -> tuple[IntArray, BoolArray]:
             reached, parent = breadth_first_order(graph, root, directed=False)
             for face in reached[1:]:
                 above = int(parent[face])
-                differs = disagree.get((above, int(face)), False) or disagree.get((int(face), above), False)
+                differs = (above, int(face)) in disagree or (int(face), above) in disagree
                 flipped[face] = flipped[above] ^ differs
     return patch, flipped
 
@@ -304,7 +304,7 @@ def take_apart(surface: RepairedSurface) -> None:
     faces, count = surface.faces, len(surface.faces)
     directed = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     forward = directed[:, 0] < directed[:, 1]
-    _, edge = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)
+    _, edge = np.unique(row_keys(np.sort(directed, axis=1)), return_inverse=True)
     owner, order = np.tile(np.arange(count), 3), np.argsort(edge.ravel(), kind="stable")
     starts = np.flatnonzero(np.r_[True, np.diff(edge.ravel()[order]) > 0, True])
     lengths = np.diff(starts)

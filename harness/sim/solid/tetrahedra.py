@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from harness.basics.arrays import FloatArray, IntArray, read_only
+from harness.basics.arrays import FloatArray, IntArray, read_only, row_keys
 from harness.basics.errors import MeshRefused, WrongUse
 from harness.basics.mesh import Mesh, signed_volume
 from harness.objects.solid import from_manifold, to_manifold
@@ -283,7 +283,7 @@ def _open_area(mesh: Mesh, rim: IntArray) -> float:
 def joined_by_faces(cells: IntArray) -> int:
     """How many parts ``(c, 4)`` cells make that count as joined only where they share a face."""
     faces = np.sort(cells[:, FACES].reshape(-1, 3), axis=1)
-    _, which = np.unique(faces, axis=0, return_inverse=True)
+    _, which = np.unique(row_keys(faces), return_inverse=True)
     owner = np.repeat(np.arange(len(cells)), len(FACES))
     shape = (len(cells) + len(faces),) * 2
     joined = coo_array((np.ones(len(owner)), (owner, len(cells) + which.ravel())), shape=shape)
@@ -314,7 +314,7 @@ def boundary_faces(cells: IntArray) -> IntArray:
         MeshRefused: a face that more than two cells share.
     """
     faces = cells[:, FACES].reshape(-1, 3)
-    _, first, counts = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    _, first, counts = np.unique(row_keys(np.sort(faces, axis=1)), return_index=True, return_counts=True)
     if (counts > 2).any():
         raise MeshRefused(
             f"{int((counts > 2).sum())} faces of the tetrahedra are shared by more than two of them; "

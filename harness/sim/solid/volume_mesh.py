@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.basics.arrays import BoolArray, FloatArray, IntArray, row_keys
 from harness.basics.errors import MeshRefused, WrongUse
 from harness.basics.geometry import rotate_upright
 from harness.sim.solid.coordinates import move_near
@@ -223,7 +223,7 @@ def _check_overlap(cells: IntArray, reversed_: BoolArray) -> None:
     faces = cells[:, FACES].reshape(-1, 3)
     even = (faces < np.roll(faces, -1, axis=1)).sum(axis=1) == 2
     keys = np.column_stack([np.sort(faces, axis=1), even])
-    _, which, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    _, which, counts = np.unique(row_keys(keys), return_inverse=True, return_counts=True)
     involved = (counts[which.ravel()] > 1).reshape(-1, 4).any(axis=1)
     if not involved.any():
         return
@@ -274,7 +274,7 @@ def _order_middle_nodes(nodes: FloatArray, cells: IntArray, notes: list[str]) ->
 def _check_shared(cells: IntArray) -> None:
     """Refuse ten-node cells that share an edge but not its middle node."""
     ends = np.sort(cells[:, EDGES], axis=2).reshape(-1, 2)
-    _, edge = np.unique(ends, axis=0, return_inverse=True)
+    _, edge = np.unique(row_keys(ends), return_inverse=True)
     edge = edge.ravel()
     owner = np.zeros(int(edge.max()) + 1, dtype=np.int64)
     owner[edge] = cells[:, 4:].ravel()

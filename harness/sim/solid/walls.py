@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from manifold3d import Manifold
 
-from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.arrays import FloatArray, IntArray, row_keys
 from harness.basics.errors import MeshRefused
 from harness.basics.faces.face_clusters import FaceGrid, build_face_grid
 from harness.basics.faces.mesh_rays import column_crossings, first_distances
@@ -57,7 +57,9 @@ def walled(mesh: Mesh, wall: float | None) -> Mesh:
         offset = 0.5 * wall * mesh.vertex_normals
         count = len(mesh.vertices)
         edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-        _, which, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+        _, which, counts = np.unique(
+            row_keys(np.sort(edges, axis=1)), return_inverse=True, return_counts=True
+        )
         rim = np.asarray(edges[counts[which.ravel()] == 1])
         a, b = rim[:, 0], rim[:, 1]
         sides = [np.stack(side, axis=1) for side in ((b, a, a + count), (b, a + count, b + count))]

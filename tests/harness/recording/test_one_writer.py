@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +12,25 @@ import pytest
 
 from harness.basics.errors import WrongUse
 from harness.basics.files.lock_file import FOLDER_LOCK, hold_folder
-from harness.bench.scene import scene_from_options
-from harness.bench.station_file import load_station, station_path
+from harness.basics.mesh import Mesh
+from harness.bench.scene import SceneFile, scene_from_options
+from harness.bench.station_file import Station, load_station, station_path
 from harness.effects.scene_object import known_object
 from harness.recording.recording import Recording
 from harness.recording.run_folder import OBJECT, RunFiles, create_run, station_calibration
+from harness.sim.optics.tactile_calibration import TactileCalibration
 
-PAIRS = 24
+PAIRS = 12
+
+
+@cache
+def inputs() -> tuple[SceneFile, Station, Mesh, TactileCalibration]:
+    scene, station = scene_from_options("builtin:mug"), load_station(station_path("mock"))
+    return scene, station, known_object(scene).mesh, station_calibration(station)
 
 
 def create(folder: Path, seed: int) -> Recording:
-    scene, station = scene_from_options("builtin:mug"), load_station(station_path("mock"))
-    mesh, gel = known_object(scene).mesh, station_calibration(station)
+    scene, station, mesh, gel = inputs()
     return create_run(folder, "contact-localization", scene, station, mesh, gel, {}, seed, None)
 
 

@@ -17,7 +17,7 @@ and orientations explains it far better, the picture is in that one. Contacts th
 steeper than the linear shading, are explained badly as they are, and worse in every other way.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import islice, permutations
@@ -143,9 +143,17 @@ def match_light(
         close: grey levels, length over the channels, within which a block is explained.
         models: how many of ``MODELS`` are fitted.
     """
-    matches = islice(_models(picture, reference, close), models)
-    best = next(matches)
-    for match in matches:
+    return simplest_match(islice(fit_models(picture, reference, close), models))
+
+
+def simplest_match(matches: Iterable[LightMatch]) -> LightMatch:
+    """Return the simplest model that no more complex one explains clearly more blocks than.
+
+    Args:
+        matches: fits of the first of ``MODELS``, the simplest first.
+    """
+    best, *others = matches
+    for match in others:
         wanted = max(
             (1.0 + _RELATIVELY_MORE) * best.explained + _MORE,
             _MIN_EXPLAINED_UNEVEN if match.name == MODELS[-1] else MIN_EXPLAINED,
@@ -155,8 +163,14 @@ def match_light(
     return best
 
 
-def _models(picture: FloatArray, reference: FloatArray, close: float) -> Iterator[LightMatch]:
-    """Yield every model of the light fitted to the picture, the simplest first."""
+def fit_models(picture: FloatArray, reference: FloatArray, close: float = CLOSE) -> Iterator[LightMatch]:
+    """Yield every model of the light fitted to the picture, the simplest first.
+
+    Args:
+        picture: ``(rows, columns, 3)`` grey levels, means over blocks.
+        reference: the same, of the gel at rest.
+        close: grey levels, length over the channels, within which a block is explained.
+    """
     y, x = picture.reshape(-1, 3), reference.reshape(-1, 3)
     u, v = (axis.reshape(-1, 1) for axis in _from_centre(*picture.shape[:2]))
     one, nothing = np.ones_like(x), np.zeros(3)
@@ -173,8 +187,9 @@ def _models(picture: FloatArray, reference: FloatArray, close: float) -> Iterato
     by_gain = by_offset = np.linalg.norm(same.residual, axis=2).ravel()
     if same.explained < MIN_EXPLAINED:
         chosen = slice(None, None, max(1, len(y) // _PROPOSALS))
-        by_gain = _most_common(y, (y[chosen] + 1.0) / (x[chosen] + 1.0) * x[:, None], close)
-        by_offset = _most_common(y, y[chosen] - x[chosen] + x[:, None], close)
+        gains, offsets = (y[chosen] + 1.0) / (x[chosen] + 1.0), y[chosen] - x[chosen]
+        by_gain = _most_common(y, lambda channel: np.outer(x[:, channel], gains[:, channel]), close)
+        by_offset = _most_common(y, lambda channel: np.add.outer(x[:, channel], offsets[:, channel]), close)
     start = min(by_gain, by_offset, key=lambda residual: float(np.median(residual)))
     yield match(MODELS[1], _fit(y, np.stack([x]), by_gain, close), nothing)
     yield match(MODELS[2], np.ones((1, 3)), _fit(y - x, np.stack([one]), by_offset, close)[0])
@@ -193,9 +208,20 @@ def _weight(residual: FloatArray, width: float) -> FloatArray:
     return np.asarray(np.exp(-0.5 * (residual / width) ** 2))
 
 
-def _most_common(picture: FloatArray, proposed: FloatArray, close: float) -> FloatArray:
-    """Return the residuals ``(blocks,)`` of the one of ``(blocks, proposals, 3)`` that explains most."""
-    residual = np.sqrt(((picture[:, None] - proposed) ** 2).sum(axis=2))
+def _most_common(picture: FloatArray, propose: Callable[[int], FloatArray], close: float) -> FloatArray:
+    """Return the residuals ``(blocks,)`` of the proposed light that explains most blocks.
+
+    Args:
+        picture: ``(blocks, 3)`` grey levels.
+        propose: returns the grey levels ``(blocks, proposals)`` of one channel in every proposed light.
+        close: grey levels within which a block is explained.
+    """
+    residual: FloatArray = np.zeros(())
+    for channel in range(3):
+        difference = picture[:, channel, None] - propose(channel)
+        difference *= difference
+        residual = residual + difference
+    np.sqrt(residual, out=residual)
     return np.asarray(residual[:, int(_weight(residual, 2.0 * close).sum(axis=0).argmax())])
 
 

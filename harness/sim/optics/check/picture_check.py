@@ -18,9 +18,11 @@ from harness.sim.optics.check.light import (
     LightMatch,
     better_turned,
     channel_orders,
+    fit_models,
     in_words,
     linear_shading,
     match_light,
+    simplest_match,
     slope_fit,
     surface_residual,
     turns,
@@ -315,12 +317,13 @@ def _light_of_rest(rest: FloatArray, known: FloatArray) -> LightMatch:
 
 def _light_of_press(seen: FloatArray, rest: FloatArray) -> tuple[LightMatch, bool]:
     """Return the light of a press in terms of its resting picture's, and whether it agrees closely."""
-    light = match_light(seen, rest)
+    matches = tuple(fit_models(seen, rest))
+    light = simplest_match(matches)
     if light.explained >= _CLEAR:
         return light, True
     # Real gels change their colour around a contact, and a resting picture of another day differs by more.
     # Where a contact fills most of the view, some of its own colours agree with some gain as well.
-    light, same = (match_light(seen, rest, models=models) for models in (2, 1))
+    light, same = simplest_match(matches[:2]), matches[0]
     light = light if light.explained > _FAR_BETTER * same.explained else same
     loose = match_light(seen, rest, _CLOSE_AT_REST, _SIMPLE)
     if loose.explained < (_MIN_EXPLAINED_AT_REST if light.is_known else _CLEAR):

@@ -311,24 +311,24 @@ def _right(picture: FloatArray) -> FloatArray:
 LIGHTS: dict[str, Callable[[FloatArray], AnyArray]] = {
     **{
         f"gain {gain}": lambda picture, gain=gain: gain * picture  # type: ignore[misc]
-        for gain in (0.5, 0.7, 0.95, 0.98, 1.02, 1.05, 1.2, 1.5)
+        for gain in (0.5, 0.98, 1.02, 1.05, 1.5)
     },
     **{
         f"white balance {gains}": lambda picture, gains=gains: picture * np.array(gains)  # type: ignore[misc]
-        for gains in ((1.1, 0.9, 1.05), (0.7, 1.1, 0.9), (1.02, 1.0, 1.0), (0.97, 1.0, 1.03))
+        for gains in ((0.7, 1.1, 0.9), (1.02, 1.0, 1.0), (0.97, 1.0, 1.03))
     },
     **{
         f"offset {offset}": lambda picture, offset=offset: picture + offset  # type: ignore[misc]
-        for offset in (-20.0, -5.0, 5.0, 15.0)
+        for offset in (-20.0, 5.0, 15.0)
     },
     **{
         f"gamma {gamma}": lambda picture, gamma=gamma: 255.0 * (picture / 255.0) ** gamma  # type: ignore[misc]
-        for gamma in (0.45, 0.8, 0.95, 1.1, 1.5, 2.2)
+        for gamma in (0.45, 0.95, 1.1, 2.2)
     },
     "video levels": lambda picture: 16.0 + 219.0 / 255.0 * picture,
     **{
         f"gradient {share}": lambda picture, share=share: picture * (1.0 + share * _right(picture))  # type: ignore[misc]
-        for share in (0.02, 0.05, 0.1)
+        for share in (0.05, 0.1)
     },
     "vignette": lambda picture: picture * (1.0 - 0.2 * _right(picture) ** 2),
 }
@@ -338,11 +338,14 @@ NAMED = ("255", "white balance", "gamma", "darker", "the light changed")
 """Words of refusals that name the light."""
 
 
-@pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
+COMMON = ("gain 0.5", "gain 0.98", "gain 1.02", "gain 1.05", "offset 5.0", "gradient 0.05")
+"""Changes between the resting picture and the press that are corrected and never refused."""
+
+
+@pytest.mark.parametrize("name", LIGHTS)
 @pytest.mark.parametrize("both", [True, False])
-def test_another_light_is_corrected_to_the_right_depth_or_refused(
-    light: Callable[[FloatArray], AnyArray], both: bool
-) -> None:
+def test_another_light_is_corrected_to_the_right_depth_or_refused(name: str, both: bool) -> None:
+    light = LIGHTS[name]
     press, rest = (_case(name).astype(np.float64) for name in ("press", "rest"))
     seen, untouched = _byte(light(press)), _byte(light(rest) if both else rest)
     refused = ""
@@ -350,17 +353,7 @@ def test_another_light_is_corrected_to_the_right_depth_or_refused(
         assert _depth(seen, untouched) == pytest.approx(0.599e-3, abs=0.05e-3)
     except PictureRefused as refusal:
         refused = str(refusal)
-    assert not refused or any(word in refused for word in NAMED)
-
-
-@pytest.mark.parametrize(
-    "change", ["gain 0.5", "gain 0.98", "gain 1.02", "gain 1.05", "offset 5.0", "gradient 0.05"]
-)
-def test_a_common_change_of_the_light_is_not_refused(change: str) -> None:
-    press, rest = _case("press"), _case("rest")
-    assert _depth(_byte(LIGHTS[change](press.astype(np.float64))), rest) == pytest.approx(
-        0.599e-3, abs=0.05e-3
-    )
+    assert not refused or (any(word in refused for word in NAMED) and (both or name not in COMMON))
 
 
 @pytest.mark.parametrize("gain", [0.7, 1.05, 1.2])
@@ -369,7 +362,7 @@ def test_another_light_is_no_contact(gain: float) -> None:
     assert _depth(_byte(gain * rest.astype(np.float64)), rest) == 0.0
 
 
-@pytest.mark.parametrize("gain", [1.0, 1.02, 0.9])
+@pytest.mark.parametrize("gain", [1.02, 0.9])
 @pytest.mark.parametrize(
     "ball",
     [
@@ -425,14 +418,19 @@ def test_a_flat_contact_over_the_whole_view_is_refused_or_within_its_deviation(
         assert read.sigma[at] > 0.1e-3
 
 
-def test_no_real_press_is_refused(shared_data: Path) -> None:
-    images = read_pictures(shared_data / "tactile/objectfolder_calibs").images
-    for image in images:
+@pytest.fixture(scope="module")
+def real_presses(shared_data: Path) -> ByteArray:
+    """Every press that the calibration was made of."""
+    return read_pictures(shared_data / "tactile/objectfolder_calibs").images
+
+
+def test_no_real_press_is_refused(real_presses: ByteArray) -> None:
+    for image in real_presses:
         assert np.array_equal(checked_picture(image, BENCH).image, image)
         checked_picture(image, BENCH, REST)
 
 
 @pytest.mark.parametrize("fault", TURNS.values(), ids=TURNS)
-def test_every_real_press_turned_is_refused(shared_data: Path, fault: Fault) -> None:
-    for image in read_pictures(shared_data / "tactile/objectfolder_calibs").images[::24]:
+def test_every_real_press_turned_is_refused(real_presses: ByteArray, fault: Fault) -> None:
+    for image in real_presses[::24]:
         _refused(np.ascontiguousarray(fault(image)), None)
