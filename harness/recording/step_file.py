@@ -9,9 +9,11 @@ step file carries the SHA-256 of all of its bytes in its head, where viewers sho
 the checksum's own place counts as zeros.
 """
 
+import copy
 import json
+import threading
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -34,6 +36,9 @@ from harness.basics.whole_file import write_bytes_whole
 from harness.bench.acquisition_channels import FORCE, PRESSURE
 from harness.bench.device import Channel, Reading
 from harness.picture.image_file import decode_jpeg, require_modest_picture
+
+MAX_RECENT_BYTES = 64 * 2**20
+"""Memory of decoded steps that are kept for the next reading."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +114,7 @@ def step_of(data: bytes, path: Path, clock_offset_ns: int, summed: bool = True) 
     """Decode the bytes of a step file; the arguments are those of ``read_step``."""
     _require_intact(data, path, summed)
     try:
-        return _decoded(data, clock_offset_ns)
+        return _RECENT.decoded(data, clock_offset_ns)
     # Without a checksum the libraries that decode a file meet any bytes, and fail on them in any way.
     except Exception as error:
         raise _damaged(path, "it does not decode") from error
@@ -176,6 +181,39 @@ def _decoded(data: bytes, clock_offset_ns: int) -> StepRecord:
         readings[channel.name] = Reading(channel, times, np.array([value for value, _ in decoded]), encoded)
     return StepRecord(step, readings, float(described["seconds"]))
 
+
+class _RecentSteps:
+    """Steps that were decoded last: an answer and its report read each step several times.
+
+    A step is found by the SHA-256 of its bytes, so that it is never out of date; readings cannot be changed.
+    """
+
+    def __init__(self) -> None:
+        self._steps: dict[tuple[bytes, int], StepRecord] = {}
+        self._lock = threading.Lock()
+
+    def decoded(self, data: bytes, clock_offset_ns: int) -> StepRecord:
+        """Decode the bytes of a step file, or return the step of the same bytes."""
+        key = sha256(data).digest(), clock_offset_ns
+        with self._lock:
+            record = self._steps.pop(key, None)
+        if record is None:
+            record = _decoded(data, clock_offset_ns)
+        with self._lock:
+            self._steps[key] = record
+            while len(self._steps) > 1 and sum(map(_size, self._steps.values())) > MAX_RECENT_BYTES:
+                self._steps.pop(next(iter(self._steps)))
+        step = replace(record.step, parameters=copy.deepcopy(record.step.parameters))
+        return replace(record, step=step, readings=dict(record.readings))
+
+
+def _size(record: StepRecord) -> int:
+    """Memory of the samples of a step, in bytes."""
+    readings = record.readings.values()
+    return sum(each.times.nbytes + each.values.nbytes + sum(map(len, each.encoded)) for each in readings)
+
+
+_RECENT = _RecentSteps()
 
 _JSON_SCHEMA = {
     "type": "object",

@@ -89,6 +89,43 @@ def test_an_image_that_states_more_pixels_than_a_camera_has_is_not_unpacked(
     tracemalloc.stop()
 
 
+def test_a_step_is_decoded_once_and_a_changed_file_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    decoded, counted = step_file._decoded, list[int]()
+
+    def count(data: bytes, clock_offset_ns: int) -> StepRecord:
+        counted.append(clock_offset_ns)
+        return decoded(data, clock_offset_ns)
+
+    monkeypatch.setattr(step_file, "_RECENT", step_file._RecentSteps())
+    monkeypatch.setattr(step_file, "_decoded", count)
+    path, reading = tmp_path / "000.mcap", joints([[0.0] * 6])
+    record = StepRecord(Step(0, "press", {"depth_m": 1e-3}), {"arm.joints": reading}, 1.5)
+    write_step(path, record, OFFSET_NS)
+    first = read_step(path, OFFSET_NS)
+    vars(first)["readings"].clear()
+    vars(first.step)["parameters"].clear()
+    assert read_step(path, OFFSET_NS).step == record.step
+    assert set(read_step(path, OFFSET_NS).readings) == {"arm.joints"}
+    assert len(counted) == 1
+    write_step(path, replace(record, seconds=2.5), OFFSET_NS)
+    assert read_step(path, OFFSET_NS).seconds == 2.5
+    assert len(counted) == 2
+
+
+def test_memory_of_decoded_steps_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recent = step_file._RecentSteps()
+    monkeypatch.setattr(step_file, "_RECENT", recent)
+    monkeypatch.setattr(step_file, "MAX_RECENT_BYTES", 1000)
+    for index in range(5):
+        path = tmp_path / f"{index:03d}.mcap"
+        record = StepRecord(Step(index, "press", {}), {"arm.joints": joints([[0.0] * 6] * 10)}, 0.0)
+        write_step(path, record, OFFSET_NS)
+        read_step(path, OFFSET_NS)
+    assert [step.step.index for step in recent._steps.values()] == [4]
+
+
 def test_readings_refuse_to_be_written_to(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="read-only"):
         joints([[0.0] * 6]).values[0, 0] = 1.0
