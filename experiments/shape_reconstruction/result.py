@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from experiments.shape_reconstruction.answer import SENSES, ScoredShape, ShapeAnswer, base_from_stand
 from experiments.shape_reconstruction.fits import SEEN, TOUCHED, ShapeEstimate
@@ -222,6 +221,8 @@ def obj_bytes_of(estimate: ShapeEstimate) -> bytes:
 
 def glb_bytes_of(estimate: ShapeEstimate) -> bytes:
     """Binary glTF 2.0, painted; metres, y up."""
+    import trimesh  # it imports networkx: a third of a second of each start of the program
+
     colours = np.column_stack([colours_of(estimate.deviation), np.full(len(estimate.deviation), 255)])
     body = trimesh.Trimesh(
         estimate.mesh.vertices,

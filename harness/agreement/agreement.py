@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import OutOfDomain
@@ -169,11 +169,20 @@ def judge_residuals(
         if one.residuals:
             each = false_alarm / compared / len(one.residuals)
             dofs = [residual.dof for residual in one.residuals]
-            limits = tuple(np.atleast_1d(chi2.isf(each, dofs)).tolist())
+            limits = tuple(np.atleast_1d(chdtri(dofs, each)).tolist())
             beyond = any(r.chi_square > limit for r, limit in zip(one.residuals, limits, strict=True))
             verdict = "does not fit" if beyond else "fits"
         found.append(JudgedSense(one, verdict, limits))
     return Agreement(about, false_alarm, tuple(found))
+
+
+def probability_of_at_least(found: int, count: int, share: float) -> float:
+    """Return the probability of ``found`` or more successes in ``count`` trials, each of ``share``."""
+    if found == 0:
+        return 1.0
+    from scipy.stats import binom  # half a second of each start of the program
+
+    return float(binom.sf(found - 1, count, share))
 
 
 def _sentence(one: JudgedSense) -> str:

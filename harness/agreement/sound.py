@@ -24,9 +24,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import binom, norm
+from scipy.special import log_ndtr, ndtr
 
-from harness.agreement.agreement import Residual, SenseResiduals, SideBySide, Source
+from harness.agreement.agreement import (
+    Residual,
+    SenseResiduals,
+    SideBySide,
+    Source,
+    probability_of_at_least,
+)
 from harness.agreement.stated_error import gain_error
 from harness.agreement.subject import PressedContact, Subject
 from harness.basics.arrays import BoolArray, FloatArray
@@ -170,7 +176,7 @@ def resonance_residual(step: int, peaks: FloatArray, modes: FloatArray, noise: R
     """Test how many of ``(P,)`` peaks the ``(m,)`` ascending modes explain, both in Hz, as ``-2 ln p``."""
     found = matched(peaks, modes, noise)
     unexplained = int(np.count_nonzero(~found.explained))
-    probability = float(binom.sf(unexplained - 1, len(peaks), noise.clutter))
+    probability = probability_of_at_least(unexplained, len(peaks), noise.clutter)
     numbers = {
         "resonances": float(len(peaks)),
         "unexplained": float(unexplained),
@@ -218,9 +224,9 @@ def microphone_residual(
         "resonances": float(len(gains)),
         "single_modes": float(len(turns)),
         **{f"{name}_off_in_sigmas": value for name, value in medians.items()},
-        "probability": float(norm.sf(sigmas)),
+        "probability": float(ndtr(-sigmas)),
     }
-    return Residual(step, "shares of the strikes", -2.0 * float(norm.logsf(sigmas)), 2.0, numbers)
+    return Residual(step, "shares of the strikes", -2.0 * float(log_ndtr(-sigmas)), 2.0, numbers)
 
 
 def gain_score(peak: Peak, modes: StruckModes, noise: ShareNoise) -> float | None:

@@ -1,7 +1,7 @@
 """What a source states of its own error: a network, on its model card."""
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from harness.agreement.agreement import Source
 from harness.agreement.subject import Subject
@@ -36,7 +36,7 @@ def map_errors(subject: Subject, source: Source) -> FloatArray:
     if source != "network":
         return np.zeros(1)
     median, tenth = (_stated(subject, "touch", name) for name in _MAPS)
-    decibels = median + max(0.0, median - tenth) / norm.isf(0.1) * norm.ppf(_SLICES)
+    decibels = median + max(0.0, median - tenth) / -ndtri(0.1) * ndtri(_SLICES)
     return rms_at(decibels)
 
 

@@ -17,9 +17,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
-from scipy.stats import binom, chi2
+from scipy.special import chdtrc, chdtri
 
-from harness.agreement.agreement import Residual, SenseResiduals, SideBySide, Source
+from harness.agreement.agreement import (
+    Residual,
+    SenseResiduals,
+    SideBySide,
+    Source,
+    probability_of_at_least,
+)
 from harness.agreement.arm import twisted
 from harness.agreement.place_noise import twist_covariance
 from harness.agreement.stated_error import gross_share, map_errors
@@ -154,16 +160,16 @@ def combine_chi_squares(chi_squares: FloatArray, dof: float, outlier_probability
     """
     if len(chi_squares) == 1 and outlier_probability == 0.0:
         return float(chi_squares[0])
-    probability = outlier_probability + (1.0 - outlier_probability) * float(chi2.sf(chi_squares, dof).mean())
-    return float(chi2.isf(max(probability, _LEAST), dof))
+    probability = outlier_probability + (1.0 - outlier_probability) * float(chdtrc(dof, chi_squares).mean())
+    return float(chdtri(dof, max(probability, _LEAST)))
 
 
 def count_residual(residuals: Sequence[Residual], outlier_probability: float) -> Residual:
     """Test the number of contacts that do not fit, as ``-2 ln p``; ``outlier_probability`` as above."""
     share = outlier_probability + (1.0 - outlier_probability) * _IMPROBABLE
-    found = chi2.sf([one.chi_square for one in residuals], [one.dof for one in residuals])
+    found = chdtrc([one.dof for one in residuals], [one.chi_square for one in residuals])
     unlike = int(np.count_nonzero(found < share))
-    probability = float(binom.sf(unlike - 1, len(residuals), share))
+    probability = probability_of_at_least(unlike, len(residuals), share)
     numbers = {
         "contacts": float(len(residuals)),
         "unlike": float(unlike),

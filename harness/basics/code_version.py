@@ -9,6 +9,8 @@ from pathlib import Path
 
 OURS = ("harness", "drivers", "mocks", "experiments", "calibration")
 
+_STATEMENTS = (ast.stmt, ast.ExceptHandler, ast.match_case)
+
 
 def content_hash(module: str) -> str:
     """Of the source of a module and of every module of ours that it imports, at any depth.
@@ -36,8 +38,12 @@ def closure(module: str) -> frozenset[str]:
 @cache
 def _imported(module: str) -> frozenset[str]:
     names: set[str] = set()
-    for node in ast.walk(ast.parse(_source(module))):
+    waiting: list[ast.AST] = [ast.parse(_source(module))]
+    while waiting:
+        node = waiting.pop()
         names.update(_named(node))
+        # Only statements hold imports; expressions are most of the nodes.
+        waiting.extend(child for child in ast.iter_child_nodes(node) if isinstance(child, _STATEMENTS))
     return frozenset(name for name in names if name.split(".")[0] in OURS)
 
 

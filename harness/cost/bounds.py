@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
-from scipy.special import digamma
+from scipy.special import digamma, stdtrit
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
@@ -38,7 +37,7 @@ def predicted_at_most(values: FloatArray, share: float = KEPT) -> float:
     if count < 2 or not (np.isfinite(values).all() and (values > 0.0).all()):
         raise WrongUse(f"a bound on the next of {count} values needs two or more, all above zero")
     logs = np.log(values)
-    reach = float(stats.t.ppf(share, count - 1)) * float(logs.std(ddof=1)) * np.sqrt(1.0 + 1.0 / count)
+    reach = float(stdtrit(count - 1, share)) * float(logs.std(ddof=1)) * np.sqrt(1.0 + 1.0 / count)
     return float(np.exp(logs.mean() + reach))
 
 
@@ -100,7 +99,7 @@ def _most_of_the_rest(point: Point, name: str | None, work: float | None) -> flo
     variance = (_LENT * float(np.exp(lent)) + squares) / (_LENT + freedom)
     aside = float(np.log(work)) - own.work if work is not None and found.squares > 0.0 else 0.0
     unsure = 1.0 + 1.0 / len(own.rest) + (aside**2 / found.squares if aside else 0.0)
-    reach = float(stats.t.ppf(KEPT, _LENT + freedom)) * np.sqrt(variance * unsure)
+    reach = float(stdtrit(_LENT + freedom, KEPT)) * np.sqrt(variance * unsure)
     return float(np.exp(own.seconds + found.slope * aside + reach))
 
 

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq
-from scipy.signal import resample
 
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, read_only
 from harness.basics.clipping import is_clipped
@@ -355,6 +354,9 @@ def measure_blow(force: AnyArray, rate: float, level: float = 0.1) -> Blow:
     within = risen[begin:end]
     # ``_FINE`` points a sample; mirrored, so that the ends meet.
     mirrored = np.concatenate([within, within[::-1]])
+    # scipy.signal imports scipy.stats, half a second of each start of the program.
+    from scipy.signal import resample
+
     fine: FloatArray = resample(mirrored, len(mirrored) * _FINE)[: (len(within) - 1) * _FINE + 1]
     peak = float(fine.max())
     touch, touch_slopes = _above(fine, level * peak)

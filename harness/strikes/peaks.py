@@ -13,7 +13,6 @@ from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.basics.errors import DataRefused
@@ -109,6 +108,9 @@ def _bands(spectra: Spectra, settings: Analysis) -> list[tuple[int, int, int]]:
     open_bins = excited.sum(axis=0) >= 2
     level = np.where(open_bins, 10.0 * np.log10(np.maximum(power, 1e-300)), -3000.0)
     loudest = float(level.max())
+    # scipy.signal imports scipy.stats, half a second of each start of the program.
+    from scipy.signal import find_peaks
+
     tops, found = find_peaks(np.maximum(level, loudest - settings.range), prominence=min(settings.prominence))
     heard = (power[tops] > noise[tops] * 10.0 ** (settings.above_noise / 10.0)) & open_bins[tops]
     step = float(spectra.frequencies[1])

@@ -22,8 +22,6 @@ import numpy.typing as npt
 from numpy.polynomial import chebyshev
 from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.optimize import least_squares
-from scipy.signal import find_peaks
-from scipy.stats import f as f_distribution
 
 from harness.basics.arrays import AnyArray, FloatArray, read_only
 
@@ -266,6 +264,10 @@ def new_poles(
     channels, count = power.shape
     # The floor is itself an estimate: a median of n is worth a mean of n / 2.08.
     known = 2.0 * channels * reach / _MEDIAN_COSTS
+    # They are half a second of each start of the program.
+    from scipy.signal import find_peaks
+    from scipy.stats import f as f_distribution
+
     threshold = channels * float(f_distribution.isf(search.false_alarm / count, 2.0 * channels, known))
     level = 10.0 * np.log10(np.maximum(sizes, 1e-30))
     padded = np.concatenate([[-300.0], level, [-300.0]])

@@ -4,13 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
-from scipy.signal import stft
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.mesh import Mesh
@@ -222,6 +220,8 @@ def strike_figure(shown: ShownStrike) -> Figure:
 
 def colourable(mesh: Mesh) -> Mesh:
     """The same surface in triangles so small that a mode may be linear in each: a box has twelve."""
+    import trimesh  # it imports networkx: a third of a second of each start of the program
+
     while _longest_edge(mesh) > _FINE * mesh.diagonal and 4 * len(mesh.faces) <= _MOST_FACES:
         finer = trimesh.remesh.subdivide(mesh.vertices, mesh.faces)  # type: ignore[no-untyped-call]
         mesh = Mesh(*finer)
@@ -246,6 +246,9 @@ def spectrogram(sound: FloatArray, rate: float) -> tuple[FloatArray, FloatArray,
     window = 1 << max(int(np.round(np.log2(_WINDOW * rate))), 4)
     padded = np.pad(sound[:lasting], (0, max(window - lasting, 0)))
     hop = max(len(padded) // _FRAMES, window // 8, 1)
+    # scipy.signal imports scipy.stats, half a second of each start of the program.
+    from scipy.signal import stft
+
     frequencies, times, found = stft(padded, rate, "hann", window, window - min(hop, window - 1))
     levels = 20.0 * np.log10(np.maximum(np.abs(found) / np.abs(found).max(), 10.0 ** (MODE_FLOOR / 20.0)))
     return times, frequencies, levels

@@ -9,7 +9,6 @@ becomes ``w t exp(-d t)``, to ``d > w``, where it becomes a hyperbolic sine.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import oaconvolve
 
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray
 from harness.basics.errors import WrongUse
@@ -123,6 +122,9 @@ def ring(
         kernels = np.real(amplitudes[:, heavy]) @ impulse_response(*heavy_modes) / rate
         if np.iscomplexobj(amplitudes):
             kernels += np.imag(amplitudes[:, heavy]) @ impulse_response(*heavy_modes, True) / rate
+        # scipy.signal imports scipy.stats, half a second of each start of the program.
+        from scipy.signal import oaconvolve
+
         sound += oaconvolve(force, kernels, axes=1)[:, : force.shape[1]]
     return sound
 

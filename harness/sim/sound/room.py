@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import oaconvolve
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import WrongUse
@@ -88,6 +87,9 @@ def room_response(
 
 def reverberated(pressure: FloatArray, response: FloatArray) -> FloatArray:
     """``(k, t)`` Pa in the room, of ``(k, t)`` Pa in the open; what sounds on after the end is cut."""
+    # scipy.signal imports scipy.stats, half a second of each start of the program.
+    from scipy.signal import oaconvolve
+
     heard: FloatArray = oaconvolve(pressure, response[None], axes=1)[:, : pressure.shape[1]]
     return heard
 
