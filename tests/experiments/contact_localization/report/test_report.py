@@ -1,5 +1,6 @@
 """The report of a localization: the answer in words and numbers, pictures of each contact, and their gaps."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import cast
@@ -9,6 +10,7 @@ import pytest
 
 from experiments.contact_localization.answer import ScoredContact
 from experiments.contact_localization.experiment import EXPERIMENT
+from experiments.contact_localization.report import report as report_module
 from experiments.contact_localization.report.report import create_report
 from harness.effects.quantities import Quantities
 from harness.experiment.answer import score
@@ -30,11 +32,21 @@ TILES = ("live", "simulated", "difference", "height_live", "height_simulated")
 PICTURES = ("bench", "contacts", "posterior", "posterior_by_contact", "error_by_contact", "error_by_seconds")
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _small_views() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr(report_module, "SIDE_PIXELS", 160)
+        yield
+
+
 @pytest.fixture(scope="module")
 def scored(tmp_path_factory: pytest.TempPathFactory) -> ScoredContact:
-    """Two contacts with the mug, answered from touch."""
+    """Two contacts with the mug, answered from touch; the first is marked as slipped."""
     recording = in_process_run(tmp_path_factory.mktemp("run") / "mug", touch_scene(contacts=2), seed=5)
-    return score(EXPERIMENT, RunFiles(recording), chosen([]))
+    made = score(EXPERIMENT, RunFiles(recording), chosen([]))
+    last = made.found.last
+    slipped = (replace(last.gates[0], slipped=True), *last.gates[1:])
+    return replace(made, found=replace(made.found, last=replace(last, gates=slipped)))
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +62,22 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def report(scored: ScoredContact, comparison: Comparison, folder: Path) -> RunReport:
     return create_report(scored, comparison, folder)
+
+
+@pytest.fixture(scope="module")
+def bare_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("bare")
+
+
+@pytest.fixture(scope="module")
+def bare(scored: ScoredContact, comparison: Comparison, bare_folder: Path) -> RunReport:
+    """The report of a run without a truth, for which nothing of touch was simulated."""
+    real = replace(scored, truth=None)
+    values = {
+        key: value for key, value in comparison.evaluation.values.items() if not key.startswith("touch")
+    }
+    without = replace(comparison, evaluation=replace(comparison.evaluation, values=cast(Quantities, values)))
+    return create_report(replace(real, result=EXPERIMENT.result(real)), without, bare_folder)
 
 
 def section(report: RunReport, title: str) -> PageSection:
@@ -93,11 +121,7 @@ def test_the_answer_states_position_error_certainty_and_ambiguity(
     assert (likely.value, likely.unit) == (str(len(last.modes)), COUNT)
 
 
-def test_without_a_truth_nothing_is_compared_with_it(
-    scored: ScoredContact, comparison: Comparison, tmp_path: Path
-) -> None:
-    real = replace(scored, truth=None)
-    bare = create_report(replace(real, result=EXPERIMENT.result(real)), comparison, tmp_path)
+def test_without_a_truth_nothing_is_compared_with_it(bare: RunReport) -> None:
     assert "true" not in bare.sentence
     assert not [value for value in bare.values if "error" in value.quantity]
     (missing,) = section(bare, "Error").blocks
@@ -110,13 +134,7 @@ def test_likely_positions_are_rows(report: RunReport, scored: ScoredContact) -> 
     assert [row[1] for row in likely.rows] == [f"{100 * m.weight:.1f} %" for m in scored.found.last.modes]
 
 
-def test_each_contact_has_its_flags_its_fit_and_five_tiles(
-    scored: ScoredContact, comparison: Comparison, tmp_path: Path
-) -> None:
-    last = scored.found.last
-    slipped = (replace(last.gates[0], slipped=True), *last.gates[1:])
-    found = replace(scored.found, last=replace(last, gates=slipped))
-    report = create_report(replace(scored, found=found), comparison, tmp_path)
+def test_each_contact_has_its_flags_its_fit_and_five_tiles(report: RunReport) -> None:
     _, first, second = section(report, "Contact by contact").blocks
     assert isinstance(first, PageSection)
     assert isinstance(second, PageSection)
@@ -132,19 +150,15 @@ def test_each_contact_has_its_flags_its_fit_and_five_tiles(
 
 
 def test_what_was_not_simulated_leaves_the_other_tiles(
-    scored: ScoredContact, comparison: Comparison, tmp_path: Path
+    scored: ScoredContact, bare: RunReport, bare_folder: Path
 ) -> None:
-    values = {
-        key: value for key, value in comparison.evaluation.values.items() if not key.startswith("touch")
-    }
-    bare = replace(comparison, evaluation=replace(comparison.evaluation, values=cast(Quantities, values)))
-    contact = section(create_report(scored, bare, tmp_path), "Contact by contact").blocks[1]
+    contact = section(bare, "Contact by contact").blocks[1]
     assert isinstance(contact, PageSection)
     tiles = contact.blocks[-1]
     assert isinstance(tiles, Tiles)
     shown = {title.split(":")[0]: picture for title, picture in tiles.tiles}
     assert shown["simulated"] == Missing("the scene's observe does not ask for touch.image")
     assert shown["height, simulated"] == Missing("the scene's observe does not ask for touch.gel")
-    assert (tmp_path / "contact_1_live.png").exists()
-    assert not (tmp_path / "contact_1_difference.png").exists()
+    assert (bare_folder / "contact_1_live.png").exists()
+    assert not (bare_folder / "contact_1_difference.png").exists()
     assert np.all(scored.found.readings.gels[0].height < 5e-3)

@@ -95,7 +95,10 @@ def scored(model: Model, strikes: tuple[Strike | None, ...], asked: bool = True)
 
 
 def analyse_strikes(model: Model, strikes: tuple[Strike | None, ...]) -> tuple[Answer, StrikeEvidence]:
-    made = scored(model, strikes)
+    return analyse(scored(model, strikes))
+
+
+def analyse(made: ScoredContact) -> tuple[Answer, StrikeEvidence]:
     strike_evidence = gather_strikes(made)
     assert isinstance(strike_evidence, StrikeEvidence)
     return made.found, strike_evidence
@@ -110,6 +113,24 @@ def blocks_of(made: ScoredContact, folder: Path) -> tuple[list[PageBlock], dict[
     return [one for one in blocks if not isinstance(one, PageSection)], sections
 
 
+@pytest.fixture(scope="module")
+def whole(model: Model) -> ScoredContact:
+    return scored(model, STRIKES)
+
+
+Blocks = tuple[list[PageBlock], dict[str, list[PageBlock]]]
+
+
+@pytest.fixture(scope="module")
+def shown(whole: ScoredContact, album: Path) -> Blocks:
+    return blocks_of(whole, album)
+
+
+@pytest.fixture(scope="module")
+def album(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("album")
+
+
 def silent(strike: Strike) -> Strike:
     return replace(strike, force=0.0 * strike.force, silent=True, onset=0)
 
@@ -119,24 +140,18 @@ def test_a_scene_without_sound_says_that_none_was_called_for(model: Model) -> No
     assert gather_strikes(scored(model, (None,) * K)) == Missing("no contact was struck")
 
 
-def test_each_sense_is_shown_or_says_why_not(model: Model, tmp_path: Path) -> None:
-    (picture, refused), sections = blocks_of(scored(model, STRIKES), tmp_path)
+def test_each_sense_is_shown_or_says_why_not(shown: Blocks, album: Path) -> None:
+    (picture, refused), sections = shown
     assert isinstance(picture, CaptionedPicture)
     assert "green star" in picture.caption
     assert refused == Missing("no answer from touch: these are not presses of this object")
     assert list(sections) == ["Strikes", "Peaks and modes"]
-    assert (tmp_path / "senses.png").exists()
-    assert (tmp_path / "spectrograms.png").exists()
+    assert (album / "senses.png").exists()
+    assert (album / "spectrograms.png").exists()
 
 
-def test_without_a_truth_none_is_shown(model: Model, tmp_path: Path) -> None:
-    (picture, _), _ = blocks_of(replace(scored(model, STRIKES), truth=None), tmp_path)
-    assert isinstance(picture, CaptionedPicture)
-    assert "green star" not in picture.caption
-
-
-def test_peaks_stand_beside_the_modes_that_made_them(model: Model, tmp_path: Path) -> None:
-    found, strike_evidence = analyse_strikes(model, STRIKES)
+def test_peaks_stand_beside_the_modes_that_made_them(whole: ScoredContact, shown: Blocks) -> None:
+    found, strike_evidence = analyse(whole)
     peaks, factor = match_peaks(found, strike_evidence), estimate_sound_scale(found, strike_evidence)
     assert not isinstance(peaks, Missing)
     assert factor == pytest.approx(SCALE, abs=0.012)
@@ -150,7 +165,7 @@ def test_peaks_stand_beside_the_modes_that_made_them(model: Model, tmp_path: Pat
     assert sum(strike_evidence.term.weight * peak.nats for peak in peaks) > 0.0
     band = strike_evidence.term.evidence.band
     assert 0.0 < band[0] < peaks[0].frequency < peaks[-1].frequency < band[1]
-    words, _, table = blocks_of(scored(model, STRIKES), tmp_path)[1]["Peaks and modes"]
+    words, _, table = shown[1]["Peaks and modes"]
     assert f"{len(peaks)} resonances in common, {len(peaks)} of them matched to modes" in str(words)
     assert f"The object rings {100.0 * (factor - 1.0):.1f} % above its model." in str(words)
     assert isinstance(table, ReportTable)
@@ -181,7 +196,7 @@ def test_a_peak_is_a_row_with_its_modes(row: ModeRow, cells: str) -> None:
     assert "|".join(format_peak(row, 0.2)) == cells
 
 
-def test_every_strike_has_a_line_and_what_is_wrong_with_it(model: Model, tmp_path: Path) -> None:
+def test_every_strike_has_a_line_and_without_a_truth_none_is_shown(model: Model, tmp_path: Path) -> None:
     damaged = (
         STRIKES[0],
         replace(STRIKES[1], double_hit=True),
@@ -189,8 +204,11 @@ def test_every_strike_has_a_line_and_what_is_wrong_with_it(model: Model, tmp_pat
         replace(STRIKES[3], overload=True),
         silent(STRIKES[4]),
     )
-    found, strike_evidence = analyse_strikes(model, damaged)
-    sections = blocks_of(scored(model, damaged), tmp_path)[1]
+    made = scored(model, damaged)
+    found, strike_evidence = analyse(made)
+    (picture, _), sections = blocks_of(replace(made, truth=None), tmp_path)
+    assert isinstance(picture, CaptionedPicture)
+    assert "green star" not in picture.caption
     words, table, _ = sections["Strikes"]
     assert words == "1 of 5 strikes count."
     assert isinstance(table, ReportTable)
