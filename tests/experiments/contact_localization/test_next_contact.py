@@ -59,6 +59,13 @@ def after(run: RunFiles, count: int, folder: Path) -> RunFiles:
     return found
 
 
+def until(error: float, run: RunFiles) -> RunFiles:
+    """The run, were it asked to end once the place is known to so many metres."""
+    asked = run.scene.section(Localization).model_copy(update={"until": error})
+    vars(run)["scene"] = run.scene.with_section(asked)
+    return run
+
+
 def test_only_the_first_is_planned_before_anything_moves(run: RunFiles) -> None:
     planned = run.recording.planned(PLAN_KEY)
     assert [dict(PLACEHOLDER) == step for step in planned] == [False, True, True, True]
@@ -82,7 +89,8 @@ def test_every_contact_keeps_the_limits_and_says_what_error_it_should_leave(run:
 
 
 def test_a_run_that_is_resumed_goes_where_it_would_have_gone(run: RunFiles, tmp_path: Path) -> None:
-    ended, said = after(run, 2, tmp_path / "run"), list[str]()
+    """The place is known less well than it asks."""
+    ended, said = until(1e-7, after(run, 2, tmp_path / "run")), list[str]()
     step = next(chosen(ended, said))
     assert step.index == 2
     assert step.parameters == run.recording.step(2).step.parameters
@@ -111,16 +119,10 @@ def test_the_place_that_should_leave_least_error_is_taken(
     assert step.parameters[EXPECTED] < np.median(errors)
 
 
-@pytest.mark.parametrize(("until", "more"), [(0.5, False), (1e-7, True)])
-def test_no_more_are_made_once_the_place_is_known_as_well_as_was_asked(
-    run: RunFiles, tmp_path: Path, until: float, more: bool
-) -> None:
-    ended, said = after(run, 2, tmp_path / "run"), list[str]()
-    asked = ended.scene.section(Localization).model_copy(update={"until": until})
-    vars(ended)["scene"] = ended.scene.with_section(asked)
-    steps = list(chosen(ended, said)) if not more else [next(chosen(ended, said))]
-    assert bool(steps) is more
-    assert any("known as well as was asked" in sentence for sentence in said) is not more
+def test_no_more_are_made_once_the_place_is_known_as_well_as_was_asked(run: RunFiles, tmp_path: Path) -> None:
+    ended, said = until(0.5, after(run, 2, tmp_path / "run")), list[str]()
+    assert list(chosen(ended, said)) == []
+    assert any("known as well as was asked" in sentence for sentence in said)
 
 
 def test_a_contact_that_nowhere_has_a_free_way_ends_the_run_and_says_so(

@@ -30,10 +30,10 @@ def said(true: float, off: float) -> Belief:
 
 @pytest.mark.parametrize(
     "besides", [0.0, pytest.param(0.1, marks=pytest.mark.slow), pytest.param(0.2, marks=pytest.mark.slow)]
-)  # each draws 150 cases
+)  # each draws 60 cases
 def test_the_deviation_found_is_that_of_the_errors_beyond_what_was_stated(besides: float) -> None:
     random = np.random.default_rng(4)
-    errors = np.hypot(STATED, besides) * random.standard_normal(150)
+    errors = np.hypot(STATED, besides) * random.standard_normal(60)
     found = likeliest_sigma(log_densities([(said(0.2, float(off)), 0.2) for off in errors]))
     assert found == pytest.approx(besides, abs=1.01 * SIGMAS[1])
 

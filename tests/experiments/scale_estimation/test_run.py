@@ -37,8 +37,18 @@ def touched(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Recor
     return ran(tmp_path_factory.mktemp("scale") / "run", scene_of(3), station)
 
 
-def test_the_size_is_found_by_sight_by_touch_and_by_both(touched: Recording) -> None:
-    result = answered(touched)
+@pytest.fixture(scope="module")
+def finished(touched: Recording, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Its result, with a report."""
+    accuracy, draw = Accuracy.default(EXPERIMENT.knobs), partial(write_run_page, EXPERIMENT)
+    folder = tmp_path_factory.mktemp("finished")
+    return dict(finish(EXPERIMENT, RunFiles(touched), accuracy, draw, folder=folder))
+
+
+def test_the_size_is_found_by_sight_by_touch_and_by_both(
+    touched: Recording, finished: dict[str, Any]
+) -> None:
+    result = finished
     true = json.loads(touched.truth_path.read_text())["differences"]["longest_side_m"]
     for sense, within in (("vision", 0.03), ("touch", 0.15), ("fused", 0.03)):
         one = result["estimates"][sense]
@@ -50,20 +60,21 @@ def test_the_size_is_found_by_sight_by_touch_and_by_both(touched: Recording) -> 
     assert "does not ask" in result["estimates"]["audio"]["refused"]
 
 
-def test_the_truth_changes_no_estimate(touched: Recording, tmp_path: Path) -> None:
-    before = answered(touched)
+def test_the_truth_changes_no_estimate(touched: Recording, finished: dict[str, Any], tmp_path: Path) -> None:
     away = touched.truth_path.rename(tmp_path / "truth.json")
     try:
         after = answered(touched)
     finally:
         away.rename(touched.truth_path)
-    assert after["size_m"] == before["size_m"]
+    assert after["size_m"] == finished["size_m"]
     assert after["estimates"]["fused"]["error_m"] is None
 
 
 @pytest.mark.slow  # a whole run; each sense names it in its own tests
-def test_a_size_beyond_the_range_that_was_asked_about_is_named(touched: Recording) -> None:
-    true = answered(touched)["size_m"]
+def test_a_size_beyond_the_range_that_was_asked_about_is_named(
+    touched: Recording, finished: dict[str, Any]
+) -> None:
+    true = finished["size_m"]
     run = RunFiles(touched)
     wrong = run.scene.object.model_copy(update={"sizes": (1.3 * true, 2.6 * true)})
     object.__setattr__(run, "scene", run.scene.model_copy(update={"object": wrong}))
@@ -77,9 +88,11 @@ def test_a_size_beyond_the_range_that_was_asked_about_is_named(touched: Recordin
     assert any(one.startswith("vision:") and "widen object.sizes" in one for one in result["warnings"])
 
 
-def test_a_spoiled_picture_is_named_and_the_rest_answers(touched: Recording, tmp_path: Path) -> None:
+def test_a_spoiled_picture_is_named_and_the_rest_answers(
+    touched: Recording, finished: dict[str, Any], tmp_path: Path
+) -> None:
     result = answered(with_spoiled_pictures(touched, tmp_path / "run", "mirrored", 2))
-    assert result["contacts"] == answered(touched)["contacts"] - 1
+    assert result["contacts"] == finished["contacts"] - 1
     assert result["warnings"][0].startswith("step 3: ")
     assert result["estimates"]["touch"]["size_m"] is not None
 
@@ -94,7 +107,7 @@ def test_where_no_picture_is_left_touch_is_refused_with_the_reason(
 
 @pytest.mark.slow  # the same with strikes is tested in test_exploring.py
 def test_a_run_that_was_stopped_goes_on_with_the_same_contacts(
-    touched: Recording, tmp_path: Path, station: Station
+    touched: Recording, finished: dict[str, Any], tmp_path: Path, station: Station
 ) -> None:
     recording = begin(EXPERIMENT, scene_of(3), station, 3, "unplaced", tmp_path / "run").recording
 
@@ -111,7 +124,7 @@ def test_a_run_that_was_stopped_goes_on_with_the_same_contacts(
     assert [record.step.parameters for record in again.steps()] == [
         record.step.parameters for record in touched.steps()
     ]
-    assert answered(again)["size_m"] == pytest.approx(answered(touched)["size_m"], rel=0.01)
+    assert answered(again)["size_m"] == pytest.approx(finished["size_m"], rel=0.01)
 
 
 def test_sight_alone_needs_no_contact(tmp_path: Path, station: Station) -> None:
@@ -195,9 +208,11 @@ def test_where_nothing_is_seen_heard_or_touched_the_answer_is_the_range_and_ever
     assert result["estimates"]["fused"]["high90_m"] == high
 
 
-def test_a_run_of_another_object_is_refused_by_sight_and_no_narrow_answer_remains(touched: Recording) -> None:
+def test_a_run_of_another_object_is_refused_by_sight_and_no_narrow_answer_remains(
+    touched: Recording, finished: dict[str, Any]
+) -> None:
     """This mug's outline is a wrench's that leans by ten standard deviations of its tilt."""
-    true = answered(touched)["size_m"]
+    true = finished["size_m"]
     answering = of_run(touched, mesh=build("wrench"))
     for record in touched.steps():
         answering.read(record)
@@ -243,11 +258,8 @@ def test_a_scene_that_reads_nothing_is_refused_before_anything_moves(
     assert not (tmp_path / "run").exists()
 
 
-def test_the_report_shows_each_sense_beside_the_model(touched: Recording, tmp_path: Path) -> None:
-    accuracy = Accuracy.default(EXPERIMENT.knobs)
-    draw = partial(write_run_page, EXPERIMENT)
-    result = finish(EXPERIMENT, RunFiles(touched), accuracy, draw, folder=tmp_path)
-    page = Path(result["report"]).read_text()
+def test_the_report_shows_each_sense_beside_the_model(finished: dict[str, Any]) -> None:
+    page = Path(finished["report"]).read_text()
     for title in ("Posterior of the size", "Vision", "Touch"):
         assert f"<h3>{title}</h3>" in page
     assert page.count("<img") == 3

@@ -1,6 +1,7 @@
 """Size by touch: contacts on a model itself are read back; what they leave open stays open."""
 
 from dataclasses import replace
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -34,6 +35,7 @@ PLACE = np.array([-0.42, 0.0, 0.25])
 UP = np.array([0.0, 0.0, 1.0])
 
 
+@cache
 def stand_of(name: str) -> tuple[Stand, float]:
     mesh = build(name)
     nominal = float(np.ptp(mesh.bounds, axis=0).max())
