@@ -23,7 +23,7 @@ def mug_bench() -> NominalBench:
     x /= np.linalg.norm(x)
     camera = Camera(transform(np.stack([x, np.cross(z, x), z], axis=1), eye), 240, 320, 300.0)
     return NominalBench(
-        build("mug", edge=2.3e-3),
+        build("mug", edge=4e-3),
         translation(np.array([-0.5, 0.0, 0.25])),
         translation(np.array([0.0, 0.0, 0.12])),
         GELSIGHT_R15,

@@ -30,23 +30,27 @@ assert "hammer" not in bench.instruments
 """
 
 
-def loaded_after(program: str) -> set[str]:
+PARTS = {
+    "the lab": "import mocks.lab",
+    "in process": BENCH,
+    "sound": "import mocks.daq.strike_counts, mocks.world.instrument, mocks.daq.box",
+}
+
+
+@pytest.fixture(scope="module")
+def loaded() -> dict[str, set[str]]:
+    """Modules that one process has loaded after each part."""
+    program = "".join(f"{part}\nimport sys\nprint(*sys.modules)\n" for part in PARTS.values())
     said = subprocess.run(
-        [sys.executable, "-c", program + "\nimport sys\nprint(*sys.modules)"],
-        capture_output=True,
-        text=True,
-        check=True,
-        cwd=ROOT,
-    )
-    return set(said.stdout.split())
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT
+    ).stdout.splitlines()
+    return {name: set(line.split()) for name, line in zip(PARTS, said, strict=True)}
 
 
-@pytest.mark.parametrize("program", [BENCH, "import mocks.lab"], ids=["in process", "the lab"])
-def test_a_touch_only_run_loads_nothing_of_sound(program: str) -> None:
-    assert loaded_after(program).isdisjoint(OF_SOUND)
+@pytest.mark.parametrize("part", ["the lab", "in process"])
+def test_a_touch_only_run_loads_nothing_of_sound(loaded: dict[str, set[str]], part: str) -> None:
+    assert loaded[part].isdisjoint(OF_SOUND)
 
 
-def test_what_sound_loads_is_known() -> None:
-    assert loaded_after("import mocks.daq.strike_counts, mocks.world.instrument, mocks.daq.box") >= set(
-        OF_SOUND
-    )
+def test_what_sound_loads_is_known(loaded: dict[str, set[str]]) -> None:
+    assert loaded["sound"] >= set(OF_SOUND)

@@ -153,7 +153,7 @@ def test_another_object_does_not_fit(run: RunFiles) -> None:
     assert not agreement_of(run, replace(own_subject(run), mesh=build("bowl"))).fits
 
 
-@pytest.mark.parametrize("by", [(10e-3, 0.0, 0.0), (0.0, 10e-3, 0.0), (0.0, 0.0, 10e-3)])
+@pytest.mark.parametrize("by", [(10e-3, 0.0, 0.0), (0.0, 0.0, 10e-3)])
 def test_an_object_that_was_moved_by_10_mm_does_not_fit(
     run: RunFiles, by: tuple[float, float, float]
 ) -> None:

@@ -15,7 +15,7 @@ def as_trimesh(mesh: Mesh) -> trimesh.Trimesh:
     return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
 
 
-@pytest.mark.parametrize("edge", [*EDGES, pytest.param(0.7e-3, marks=pytest.mark.slow), 9.7e-3])
+@pytest.mark.parametrize("edge", [EDGES[0], pytest.param(0.7e-3, marks=pytest.mark.slow), 9.7e-3])
 @pytest.mark.parametrize("name", MATERIALS)
 def test_a_built_object_is_one_closed_outward_solid_on_the_table(name: str, edge: float) -> None:
     mesh = build(name, edge)
@@ -41,7 +41,7 @@ def test_two_tessellations_are_one_shape_without_a_common_vertex(name: str) -> N
     apart = np.asarray(cKDTree(coarse.vertices).query(fine.vertices)[0])
     assert np.count_nonzero(apart < 1e-6) < 1e-3 * len(apart)
     nearest = trimesh.proximity.closest_point
-    off = nearest(as_trimesh(coarse), fine.vertices[::17])[1]  # type: ignore[no-untyped-call]
+    off = nearest(as_trimesh(coarse), fine.vertices[::51])[1]  # type: ignore[no-untyped-call]
     # Twice the sagitta of a 4.5 mm chord on the tightest fillet that is not subdivided by its turn.
     assert off.max() < 0.25e-3
     assert as_trimesh(fine).volume == pytest.approx(as_trimesh(coarse).volume, rel=2e-3)
@@ -51,7 +51,7 @@ def test_two_tessellations_are_one_shape_without_a_common_vertex(name: str) -> N
 def test_walls_have_the_thickness_of_the_real_thing(name: str, thinnest: float) -> None:
     mesh = build(name)
     solid = as_trimesh(mesh)
-    faces = np.random.default_rng(3).choice(len(mesh.faces), 300, p=mesh.face_areas / mesh.face_areas.sum())
+    faces = np.random.default_rng(3).choice(len(mesh.faces), 100, p=mesh.face_areas / mesh.face_areas.sum())
     inward = -mesh.face_normals[faces]
     centres = mesh.corners[faces].mean(axis=1)
     hits, rays, _ = solid.ray.intersects_location(centres + 1e-5 * inward, inward, multiple_hits=False)

@@ -22,6 +22,12 @@ from harness.twin.rehearsal import rehearse
 STATION = load_station(station_path("mock"))
 
 
+@pytest.fixture(scope="module")
+def mug_plan() -> RunPlan:
+    """Of seed 4; read only."""
+    return planned(scene_from_options("builtin:mug"), 4)
+
+
 def planned(scene: SceneFile, seed: int) -> RunPlan:
     return plan_contacts(scene, STATION, known_object(scene).mesh, seed)
 
@@ -61,15 +67,13 @@ def test_turned_about_too(shared_data: Path) -> None:
     assert_good(planned(scene, 0), scene)
 
 
-def test_the_same_seed_gives_the_same_plan() -> None:
-    scene = scene_from_options("builtin:mug")
-    assert planned(scene, 4).parameters() == planned(scene, 4).parameters()
+def test_the_same_seed_gives_the_same_plan(mug_plan: RunPlan) -> None:
+    assert planned(scene_from_options("builtin:mug"), 4).parameters() == mug_plan.parameters()
 
 
-def test_an_itinerary_cut_back_goes_on_from_there() -> None:
+def test_an_itinerary_cut_back_goes_on_from_there(mug_plan: RunPlan) -> None:
     """What was planned after the site that stays is forgotten, with its motions."""
-    scene = scene_from_options("builtin:mug")
-    plan = planned(scene, 4)
+    plan = mug_plan
     itinerary = Itinerary(plan.bench, 4)
     for k in (0, 1, 2):
         assert itinerary.visit(k, plan.sites[k].base_from_gel, patient=False)
@@ -79,9 +83,8 @@ def test_an_itinerary_cut_back_goes_on_from_there() -> None:
     assert np.array_equal(second.base_from_pressed, plan.contacts[2].base_from_pressed)
 
 
-def test_a_place_without_a_way_is_no_site_and_leaves_the_itinerary() -> None:
-    scene = scene_from_options("builtin:mug")
-    plan = planned(scene, 4)
+def test_a_place_without_a_way_is_no_site_and_leaves_the_itinerary(mug_plan: RunPlan) -> None:
+    plan = mug_plan
     itinerary = Itinerary(plan.bench, 4)
     assert itinerary.visit(0, plan.sites[0].base_from_gel, patient=False)
     through_the_table = plan.sites[1].base_from_gel.copy()

@@ -50,7 +50,7 @@ def test_sizes_that_are_near_each_other_share_one_filling(
 
     monkeypatch.setattr(instrument, "tetrahedralize", counted)
     store = Store(tmp_path)
-    for scale in np.geomspace(0.5, 2.0, 24):
+    for scale in np.geomspace(0.7, 1.4, 12):
         body_of(drawn, float(scale), store)
-    rungs = np.log(4.0**0.5) / np.log(instrument.RUNG)
+    rungs = np.log(2.0**0.5) / np.log(instrument.RUNG)
     assert 2 <= len(fills) <= rungs + 2

@@ -1,7 +1,11 @@
 """``touchstone object build`` on a small block: what it writes, says and refuses."""
 
+import contextlib
+import io
 import json
+import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +26,27 @@ def block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """A block that was built, with its cache beside it, and the answer."""
+    folder, shown = tmp_path_factory.mktemp("first"), io.StringIO()
+    trimesh.creation.box([0.2, 0.05, 0.02]).export(folder / "block.stl")
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(shown):
+        patch.setenv("TOUCHSTONE_CACHE", str(folder / "cache"))
+        assert build(folder / "block.stl") == 0
+    return folder / "block.stl", json.loads(shown.getvalue())
+
+
+@pytest.fixture
+def built(
+    first: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> tuple[Path, dict[str, Any]]:
+    """A copy of it to change."""
+    folder = Path(shutil.copytree(first[0].parent, tmp_path / "copy"))
+    monkeypatch.setenv("TOUCHSTONE_CACHE", str(folder / "cache"))
+    return folder / "block.stl", first[1]
+
+
 def build(block: Path, *more: str) -> int:
     out = str(block.parent / "object")
     return invoke(
@@ -30,11 +55,8 @@ def build(block: Path, *more: str) -> int:
     )  # fmt: skip
 
 
-def test_a_block_becomes_an_object_file_that_verifies(
-    block: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert build(block) == 0
-    answer = json.loads(capsys.readouterr().out)
+def test_a_block_becomes_an_object_file_that_verifies(first: tuple[Path, dict[str, Any]]) -> None:
+    block, answer = first
     assert len(answer["frequencies_hz"]) == 12
     assert list(answer["seconds"]) == list(answer["cpu_seconds"]) == list(STAGES)
     assert min(answer["seconds"].values()) >= 0.0
@@ -52,20 +74,24 @@ def test_a_block_becomes_an_object_file_that_verifies(
     assert network.frequencies.tolist() == answer["frequencies_hz"]
 
 
-def test_building_again_gives_the_same_bytes(block: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_building_again_gives_the_same_bytes(
+    built: tuple[Path, dict[str, Any]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    block, answer = built
+    before = (block.parent / "object" / "audio.onnx").read_bytes()
+    solved = answer["seconds"]
     assert build(block) == 0
-    first = (block.parent / "object" / "audio.onnx").read_bytes()
-    solved = json.loads(capsys.readouterr().out)["seconds"]
-    assert build(block) == 0
-    assert (block.parent / "object" / "audio.onnx").read_bytes() == first
+    assert (block.parent / "object" / "audio.onnx").read_bytes() == before
     shown = capsys.readouterr()
     again = json.loads(shown.out)["seconds"]
     assert "modes were kept" in shown.err
     assert [again[stage] for stage in ("mesh", "solve")] == [solved[stage] for stage in ("mesh", "solve")]
 
 
-def test_a_folder_of_another_object_is_refused(block: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert build(block) == 0
+def test_a_folder_of_another_object_is_refused(
+    built: tuple[Path, dict[str, Any]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    block, _ = built
     before = (block.parent / "object" / "object.json").read_bytes()
     assert build(block, "--material", "steel") == 2
     assert "name another folder" in capsys.readouterr().err

@@ -26,69 +26,74 @@ def done(job: Job) -> ObjectRecord:
 
 
 @dataclass(frozen=True)
-class TwoBuilds:
+class Built:
     meshes: Path
-    first: BuildFolder
-    second: BuildFolder
-    records: tuple[ObjectRecord, ObjectRecord]
+    out: BuildFolder
+    record: ObjectRecord
 
 
 @pytest.fixture(scope="module")
-def twice(tmp_path_factory: pytest.TempPathFactory) -> TwoBuilds:
-    """The same object built twice, of which the second knows the first's tetrahedra and nothing else."""
-    folder = tmp_path_factory.mktemp("twice")
-    first, second = BuildFolder(folder / "a"), BuildFolder(folder / "b")
-    one = done(tiny_job(folder, "block", first, BOTH))
-    shutil.copytree(first.arrays, second.arrays)
-    return TwoBuilds(folder, first, second, (one, done(tiny_job(folder, "block", second, BOTH))))
+def block_of_both(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    """A block with sound and touch; read only."""
+    folder = tmp_path_factory.mktemp("once")
+    out = BuildFolder(folder / "a")
+    return Built(folder, out, done(tiny_job(folder, "block", out, BOTH)))
 
 
 @pytest.mark.slow  # two builds; each sense's own build is compared in quick tests
-def test_two_builds_of_one_object_are_the_same_bytes(twice: TwoBuilds) -> None:
-    assert [record.outcome for record in twice.records] == ["built", "built"]
-    assert all(part.made for record in twice.records for part in record.senses.values())
-    a, b = all_bytes(twice.first.object("block")), all_bytes(twice.second.object("block"))
+def test_two_builds_of_one_object_are_the_same_bytes(block_of_both: Built, tmp_path: Path) -> None:
+    """The second knows the first's tetrahedra and nothing else."""
+    second = BuildFolder(tmp_path / "b")
+    shutil.copytree(block_of_both.out.arrays, second.arrays)
+    records = (block_of_both.record, done(tiny_job(block_of_both.meshes, "block", second, BOTH)))
+    assert [record.outcome for record in records] == ["built", "built"]
+    assert all(part.made for record in records for part in record.senses.values())
+    a, b = all_bytes(block_of_both.out.object("block")), all_bytes(second.object("block"))
     assert set(a) == {"object.json", "mesh.ply", "audio.onnx", "audio_table.npy", "audio_surface.ply",
                       "touch.onnx", "touch_nodes.npy"}  # fmt: skip
     assert a == b
 
 
-def test_what_a_clock_measured_is_in_the_record_alone(twice: TwoBuilds) -> None:
-    text = (twice.first.object("block") / "object.json").read_text()
+def test_what_a_clock_measured_is_in_the_record_alone(block_of_both: Built) -> None:
+    text = (block_of_both.out.object("block") / "object.json").read_text()
     assert "seconds_per" not in text
-    audio = twice.records[0].senses["audio"]
+    audio = block_of_both.record.senses["audio"]
     assert audio.seconds["solve"] > 0.0
     assert audio.clock["audio.network.measured.seconds_per_vertex"] > 0.0
     assert "audio.provenance.cpu_seconds.solve" in audio.clock
 
 
-def test_an_object_of_stages_verifies_under_its_own_name(twice: TwoBuilds) -> None:
-    of = ObjectFile.open(twice.first.object("block"))
+def test_an_object_of_stages_verifies_under_its_own_name(block_of_both: Built) -> None:
+    of = ObjectFile.open(block_of_both.out.object("block"))
     assert of.description.name == "block"
     assert [check for check in verify(of) if not check.passed] == []
 
 
-def test_another_material_makes_the_sound_anew_and_keeps_the_touch(twice: TwoBuilds) -> None:
-    before = all_bytes(twice.second.object("block"))
-    record = done(tiny_job(twice.meshes, "block", twice.second, BOTH, "plastic"))
+def test_another_material_makes_the_sound_anew_and_keeps_the_touch(
+    block_of_both: Built, tmp_path: Path
+) -> None:
+    out = BuildFolder(Path(shutil.copytree(block_of_both.out.folder, tmp_path / "copy")))
+    before = all_bytes(out.object("block"))
+    record = done(tiny_job(block_of_both.meshes, "block", out, BOTH, "plastic"))
     assert {sense: part.made for sense, part in record.senses.items()} == {"audio": True, "touch": False}
-    after = all_bytes(twice.second.object("block"))
-    assert ObjectFile.open(twice.second.object("block")).material == MATERIALS["plastic"]
+    after = all_bytes(out.object("block"))
+    assert ObjectFile.open(out.object("block")).material == MATERIALS["plastic"]
     assert {name for name in before if before[name] == after[name]} == {
         "mesh.ply", "touch.onnx", "touch_nodes.npy", "audio_surface.ply"
     }  # fmt: skip
-    assert stands(twice.second, read_record(twice.second, "block"), record.key)
+    assert stands(out, read_record(out, "block"), record.key)
 
 
-def test_what_stands_is_not_planned_again_and_what_is_damaged_is(twice: TwoBuilds) -> None:
-    rows = [(block_row("block"), block(twice.meshes, "block"))]
-    assert build_plan(rows, BOTH, twice.first).waiting == ()
-    network = twice.first.object("block") / "touch.onnx"
+def test_what_stands_is_not_planned_again_and_what_is_damaged_is(block_of_both: Built) -> None:
+    rows = [(block_row("block"), block(block_of_both.meshes, "block"))]
+    out = block_of_both.out
+    assert build_plan(rows, BOTH, out).waiting == ()
+    network = out.object("block") / "touch.onnx"
     content = network.read_bytes()
     network.unlink()
-    assert len(build_plan(rows, BOTH, twice.first).waiting) == 1
+    assert len(build_plan(rows, BOTH, out).waiting) == 1
     network.write_bytes(content)
-    assert build_plan(rows, BOTH, twice.first).standing == {"block"}
+    assert build_plan(rows, BOTH, out).standing == {"block"}
 
 
 @pytest.mark.parametrize(

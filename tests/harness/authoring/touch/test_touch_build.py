@@ -71,7 +71,16 @@ def test_an_unknown_profile_of_touch_is_wrong_use(block: Path, capsys: pytest.Ca
     assert "'small'" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["mug", "bowl", "plate", "pitcher", "tray", "wrench"])
+@pytest.mark.parametrize(
+    "name",
+    # The larger ones, for which the pixels have to grow, and the smallest.
+    [
+        "pitcher",
+        "tray",
+        "wrench",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("mug", "bowl", "plate")),
+    ],
+)
 def test_the_smallest_profile_has_room_for_every_built_in_object(name: str) -> None:
     """The pixels grow only where no distance of nodes leaves room for the profile's own."""
     raster, spec = RasterMesh(named_object(name)), touch_profile("smoke").codes

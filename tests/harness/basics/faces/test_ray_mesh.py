@@ -32,18 +32,20 @@ def unit_vectors(count: int, seed: int) -> FloatArray:
     return np.asarray(drawn / np.linalg.norm(drawn, axis=1, keepdims=True))
 
 
-@pytest.mark.parametrize("name", ["mug", "wrench", pytest.param("tray", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("away", [0.0, 0.3, 25.0])
+@pytest.mark.parametrize(
+    ("name", "away"),
+    [("mug", 0.0), ("wrench", 0.3), ("mug", 25.0), pytest.param("tray", 0.3, marks=pytest.mark.slow)],
+)
 def test_all_faces_asked_one_by_one_say_the_same(name: str, away: float) -> None:
-    mesh = build(name, 8e-3)
+    mesh = build(name, 10e-3)
     centre = mesh.bounds.mean(axis=0)
     random = np.random.default_rng(3)
-    origins = centre + away * unit_vectors(200, 1) + random.uniform(-0.02, 0.02, (200, 3))
-    targets = mesh.bounds[0] + random.random((200, 3)) * (mesh.bounds[1] - mesh.bounds[0])
+    origins = centre + away * unit_vectors(100, 1) + random.uniform(-0.02, 0.02, (100, 3))
+    targets = mesh.bounds[0] + random.random((100, 3)) * (mesh.bounds[1] - mesh.bounds[0])
     directions = (targets - origins) / np.linalg.norm(targets - origins, axis=1, keepdims=True)
     hits = RayMesh(mesh).first_hits(origins, directions)
     expected = asked_one_by_one(mesh, origins, directions)
-    assert np.isfinite(expected).sum() > 50
+    assert np.isfinite(expected).sum() > 30
     np.testing.assert_array_equal(np.isfinite(hits.distance), np.isfinite(expected))
     met = np.isfinite(expected)
     # Rounding of a place 25 m away.

@@ -195,7 +195,7 @@ def test_points_in_blocks_say_what_plain_float64_says(name: str, block: int) -> 
     """Of networks that look the same from every side, and of others."""
     drawn = drawn_look(GRID, SIZES[name], SCALE)
     for model in (drawn, sided(drawn)):
-        query = asked(model, 500, 2)
+        query = asked(model, 200, 2)
         density, scattered = evaluate(model, query)
         found_density, found_scattered = by_networks(model, query, block)
         np.testing.assert_allclose(found_density, density, rtol=0, atol=phase(SIZES[name]) * density.max())

@@ -1,6 +1,7 @@
 """Pictures of a strike: what is loud is bright there, what is at rest is white, what is small is refined."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -38,8 +39,13 @@ def height_at_corners(mesh: Mesh, modes: int) -> FloatArray:
     return np.repeat(height[:, :, None], modes, axis=2)
 
 
+@cache
+def bowl() -> Mesh:
+    return colourable(build("bowl"))
+
+
 def shown(modes: int = 3) -> ShownStrike:
-    mesh = colourable(build("bowl"))
+    mesh = bowl()
     return ShownStrike(
         title="bowl",
         mesh=mesh,

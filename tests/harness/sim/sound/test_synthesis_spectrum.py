@@ -62,7 +62,7 @@ def test_only_what_dies_slowly_may_be_added() -> None:
     ]
 
 
-@pytest.mark.parametrize("modes", [300, 1200])
+@pytest.mark.parametrize("modes", [300, 700])
 def test_many_modes_that_last_are_summed_so_beside_those_that_do_not(
     modes: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
