@@ -6,6 +6,7 @@ computed for every call. Both are bounded here: a file of a few kilobytes can de
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from math import prod
 from typing import NamedTuple
 
@@ -99,7 +100,18 @@ def require_bounded(model: ModelProto, name: str) -> None:
         DataRefused: a value whose size is unknown, too large, or grows faster than the number of queries;
             or too much memory or work, for constants or for one query.
     """
-    skeleton = _without_weights(model)
+    _require_bounded_skeleton(_without_weights(model).SerializeToString(deterministic=True), name)
+
+
+def query_cost(model: ModelProto, name: str) -> GraphCost:
+    """Compute the cost of one query of a graph that ``require_bounded`` accepted."""
+    return _skeleton_cost(_without_weights(model).SerializeToString(deterministic=True), name)
+
+
+# A process opens the same networks again and again, and their shapes are inferred at eleven sizes.
+@lru_cache(maxsize=32)
+def _require_bounded_skeleton(data: bytes, name: str) -> None:
+    skeleton = ModelProto.FromString(data)
     single = _values(skeleton, 1, name)
     for rows in _CHECKED_ROWS:
         for value, many in _values(skeleton, rows, name).items():
@@ -111,9 +123,9 @@ def require_bounded(model: ModelProto, name: str) -> None:
     _counted(skeleton.graph, single, name)
 
 
-def query_cost(model: ModelProto, name: str) -> GraphCost:
-    """Compute the cost of one query of a graph that ``require_bounded`` accepted."""
-    skeleton = _without_weights(model)
+@lru_cache(maxsize=32)
+def _skeleton_cost(data: bytes, name: str) -> GraphCost:
+    skeleton = ModelProto.FromString(data)
     return _counted(skeleton.graph, _values(skeleton, 1, name), name)
 
 
