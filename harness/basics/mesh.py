@@ -56,7 +56,9 @@ class Mesh:
     @cached_property
     def bounds(self) -> FloatArray:
         """``(2, 3)`` metres: least and greatest corner of the axis-aligned box."""
-        used = self.vertices[np.unique(self.faces)]
+        is_used = np.zeros(len(self.vertices), np.bool_)
+        is_used[self.faces] = True
+        used = self.vertices[is_used]
         return read_only(np.array([used.min(axis=0), used.max(axis=0)]))
 
     @property

@@ -217,7 +217,9 @@ def split_long_edges(mesh: Mesh, longest: float) -> Mesh:
     vertices, faces = mesh.vertices, mesh.faces
     while True:
         edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1)
-        lengths = np.linalg.norm(vertices[edges[..., 0]] - vertices[edges[..., 1]], axis=-1)
+        # Adding the three coordinates is several times faster than a norm along an axis of three.
+        x, y, z = np.moveaxis((vertices[edges[..., 0]] - vertices[edges[..., 1]]) ** 2, -1, 0)
+        lengths = np.sqrt(x + y + z)
         long = lengths > longest
         if not long.any():
             return Mesh(vertices, faces)

@@ -138,8 +138,9 @@ class GelContact:
             raise ValueError(
                 f"an object of {mesh.diagonal:.2f} m is larger than any that the gel could touch"
             )
-        low = np.floor((mesh.corners.min(axis=1) - self._origin) / CELL).astype(np.int64)
-        high = np.floor((mesh.corners.max(axis=1) - self._origin) / CELL).astype(np.int64)
+        a, b, c = (self._corners[:, corner] for corner in range(3))
+        low = np.floor((np.minimum(np.minimum(a, b), c) - self._origin) / CELL).astype(np.int64)
+        high = np.floor((np.maximum(np.maximum(a, b), c) - self._origin) / CELL).astype(np.int64)
         self._starts, self._members = _fill(low, high, self._shape)
         self._counts = (round(window[0] / spacing), round(window[1] / spacing))
         self._pitch = (window[0] / self._counts[0], window[1] / self._counts[1])
