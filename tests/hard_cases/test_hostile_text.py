@@ -25,6 +25,7 @@ def test_a_hostile_text_is_refused_in_one_sentence(name: str, read: dict[str, tu
     said, seconds = read[name]
     assert said.startswith("refused: ")
     assert name in said
+    assert name != "bomb.obj" or "more than 400,000 vertices" in said
     assert len(said) < 300
     assert "\n" not in said
     assert seconds < CPU_SECONDS

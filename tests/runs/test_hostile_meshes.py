@@ -10,6 +10,9 @@ import pytest
 
 from tests.support.hostile_meshes import FILES, MEMORY, SECONDS
 
+LIMITS = {"vertices.3mf": "more than 300,000 vertices", "triangles.3mf": "at most 200,000 are read"}
+"""Limits that a file must meet first; others would refuse it too."""
+
 
 @pytest.fixture(scope="module")
 def readings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, object]]:
@@ -38,6 +41,7 @@ def test_a_hostile_file_is_refused_in_one_sentence(readings: dict[str, dict[str,
     for kind, text in errors:
         assert kind == "refused", f"{kind}: {text}"
         assert Path(name).name in text
+        assert LIMITS.get(name, "") in text
         assert "\n" not in text
         assert text.isprintable()
         assert len(text) < 400
