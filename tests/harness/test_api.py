@@ -18,6 +18,7 @@ from harness.api import answer, tactile_image
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.cli import invoke
 from harness.picture.image_file import write_png
+from harness.report.figures import shading
 from tests.samples.drawn_presses import drawn_set
 from tests.support.whole_run import in_process_run, touch_scene
 
@@ -58,6 +59,12 @@ def run(name: str, *arguments: str) -> str:
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two contacts, recorded and not answered; nothing may be written in its folder."""
+    return in_process_run(tmp_path_factory.mktemp("recorded") / "run", touch_scene(contacts=2), seed=3).folder
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
@@ -149,10 +156,12 @@ def test_each_function_has_a_command() -> None:
     assert set(FUNCTIONS) - set(COMMANDS) == {"answer", "tactile_image"}
 
 
-def test_the_other_two_are_shorter_forms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = in_process_run(tmp_path / "run", touch_scene(contacts=2), seed=3).folder
-    replayed = touchstone.replay(folder).result
-    answered = answer(folder)
+def test_the_other_two_are_shorter_forms(
+    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shading, "_OVERSAMPLING", 1)
+    replayed = touchstone.replay(recorded, out=tmp_path / "replay").result
+    answered = answer(recorded)
     assert replayed["accuracy"] == answered["accuracy"]
     places = [each["estimates"]["touch"]["position_m"] for each in (replayed, answered)]
     assert places[0] == places[1]
@@ -186,12 +195,11 @@ def test_importing_touchstone_imports_nothing_else() -> None:
     assert done.stdout.strip() == "set()"
 
 
-def test_a_recording_is_answered_and_nothing_is_written(tmp_path: Path) -> None:
-    folder = in_process_run(tmp_path / "run", touch_scene(contacts=3), seed=3).folder
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
-    assert run("answer_of_a_recording.py", str(folder)).startswith("touch: (")
-    assert answer(folder, ["localization.rounds=0"])["accuracy"]["localization.rounds"] == 0
-    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+def test_a_recording_is_answered_and_nothing_is_written(recorded: Path) -> None:
+    before = {path: path.read_bytes() for path in recorded.parent.rglob("*") if path.is_file()}
+    assert run("answer_of_a_recording.py", str(recorded)).startswith("touch: (")
+    assert answer(recorded, ["localization.rounds=0"])["accuracy"]["localization.rounds"] == 0
+    assert {path: path.read_bytes() for path in recorded.parent.rglob("*") if path.is_file()} == before
 
 
 def test_bad_input_is_named(tmp_path: Path) -> None:
