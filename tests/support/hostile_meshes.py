@@ -323,7 +323,7 @@ def _read_both(path: Path) -> dict[str, Any]:
     from harness.sim.solid.intake import take_in
 
     if path.name in READ_ONCE:
-        parts.MAX_TRIANGLES = three_mf.MAX_TRIANGLES = 200_000
+        parts.MAX_TRIANGLES = 200_000
         three_mf._MAX_VERTICES = 300_000
     errors = []
     readings = (lambda: take_in(path, "m"), lambda: read_appearance(path, "m"))
