@@ -61,11 +61,12 @@ def test_a_row_uses_the_senses_and_the_presses_that_it_is_named_for() -> None:
     assert ShapeRow("visual-hull", "V", 0).part(BOTH).touches == ()
 
 
-@pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> dict[str, dict[str, Any]]:
+@pytest.fixture(scope="module")
+def quick() -> dict[str, dict[str, Any]]:
     tabled = {"glance": {"V": (0,)}, "hull": {"T": (4,)}, "rbf": {"TV": (4,)}}
-    monkeypatch.setattr(shape_table, "TABLED", tabled)
-    return scored_rows(BOTH, MUG, len(TOUCHES))
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr(shape_table, "TABLED", tabled)
+        return scored_rows(BOTH, MUG, len(TOUCHES))
 
 
 def test_every_answer_is_scored_and_surfaces_by_their_stated_band_too(
