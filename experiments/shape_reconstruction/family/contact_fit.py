@@ -43,7 +43,7 @@ class ContactFit:
 def contact_fit(shape: FamilyShape, seen: FamilyEvidence) -> ContactFit:
     """Compute the residuals of the contacts against a shape."""
     out, q = make_rows(seen), prepared_buffer()
-    cost = evaluate(shape.code, shape.theta, seen, False, out, q)
+    cost = evaluate(shape.code, shape.theta, seen, False, out, q, np.inf)
     sums = np.asarray(contact_sums(seen, out.values))
     count = len(sums)
     off = np.zeros(count)

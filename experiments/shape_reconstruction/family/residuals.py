@@ -89,7 +89,7 @@ def evaluate(
     robust: bool,
     out: Rows,
     q: FloatArray,
-    most: float = np.inf,
+    most: float,
 ) -> float:
     """Fill in the rows of a shape; returns half the sum of what they cost.
 

@@ -172,7 +172,7 @@ class FamilySearch:
             self._middle(tried[0]), freedom.prior_rows(self._bench, freedom.stand_rows(shape.code))
         )
         best, cost = cheapest(
-            shape.code, tried, self.coarse, prior, make_rows(self.coarse), prepared_buffer()
+            shape.code, tried, self.coarse, prior, False, make_rows(self.coarse), prepared_buffer()
         )
         placed = FamilyShape(shape.name, shape.code, tried[best])
         return Hypothesis(placed, prior, cost, np.empty((0, 0)))
@@ -238,7 +238,9 @@ class FamilySearch:
 
     def _costed(self, one: Hypothesis) -> Hypothesis:
         out, q, shape = make_rows(self.coarse), prepared_buffer(), one.shape
-        return replace(one, cost=total_cost(shape.code, shape.theta, self.coarse, one.prior, False, out, q))
+        return replace(
+            one, cost=total_cost(shape.code, shape.theta, self.coarse, one.prior, False, out, q, np.inf)
+        )
 
     def _perturb_best(self, hypotheses: list[Hypothesis], random: Random) -> list[Hypothesis]:
         """Refine perturbed copies of the best: a fit ends in the local minimum of its start."""
@@ -324,7 +326,7 @@ def total_cost(
     robust: bool,
     out: Rows,
     q: FloatArray,
-    most: float = np.inf,
+    most: float,
 ) -> float:
     """Compute half the sum of squares of readings and prior; very large where the shape is not finite.
 
@@ -338,12 +340,18 @@ def total_cost(
 
 @compiled
 def cheapest(
-    code: IntArray, tried: FloatArray, seen: FamilyEvidence, prior: PriorRows, out: Rows, q: FloatArray
+    code: IntArray,
+    tried: FloatArray,
+    seen: FamilyEvidence,
+    prior: PriorRows,
+    robust: bool,
+    out: Rows,
+    q: FloatArray,
 ) -> tuple[int, float]:
     """Find which of ``(n, size)`` vectors costs least, the first of equals; return its row and cost."""
     best, least = 0, np.inf
     for k in range(len(tried)):
-        cost = total_cost(code, tried[k], seen, prior, False, out, q, least)
+        cost = total_cost(code, tried[k], seen, prior, robust, out, q, least)
         if cost < least:
             best, least = k, cost
     return best, least
@@ -358,7 +366,7 @@ def minimize(
     basis: FloatArray,
     robust: bool,
     rounds: int,
-    curved: bool = True,
+    curved: bool,
 ) -> tuple[FloatArray, float, FloatArray]:
     """Find the vector of least cost near a start, along the directions of ``basis`` (Levenberg-Marquardt).
 
@@ -378,7 +386,7 @@ def minimize(
     """
     best = theta.copy()
     out, trial, q = make_rows(seen), make_rows(seen), prepared_buffer()
-    cost = total_cost(code, best, seen, prior, robust, out, q)
+    cost = total_cost(code, best, seen, prior, robust, out, q, np.inf)
     damping = 1e-2
     along = prior.rows @ basis.T
     curvature, slope, current = np.empty((0, 0)), np.empty(0), False

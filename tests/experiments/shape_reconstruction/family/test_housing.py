@@ -57,7 +57,7 @@ def housing_rows(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
     """``(faces,)`` in standard deviations."""
     seen, q = observe(evidence), prepared_buffer()
     out = make_rows(seen)
-    evaluate(shape.code, shape.theta, seen, False, out, q)
+    evaluate(shape.code, shape.theta, seen, False, out, q, np.inf)
     first = contact_row_count(seen)
     return out.values[first : first + len(seen.faces)].copy()
 
@@ -75,8 +75,8 @@ def test_a_shape_before_the_face_disagrees_as_one_within_it_does(name: str, gap:
     kept_off = replace(evidence, touches=tuple(replace(one, stopped=False) for one in evidence.touches))
     seen, loose = observe(evidence), observe(kept_off)
     q = prepared_buffer()
-    cost = evaluate(shape.code, shape.theta, seen, False, make_rows(seen), q)
-    without = evaluate(shape.code, shape.theta, loose, False, make_rows(loose), q)
+    cost = evaluate(shape.code, shape.theta, seen, False, make_rows(seen), q, np.inf)
+    without = evaluate(shape.code, shape.theta, loose, False, make_rows(loose), q, np.inf)
     assert cost - without == pytest.approx(0.5 * np.sum((rows / sigma) ** 2))
 
 
@@ -85,7 +85,7 @@ def test_a_face_that_nothing_is_near_costs_no_more_than_in_proportion() -> None:
     far = housing_rows(shape, evidence)
     seen, q = observe(evidence), prepared_buffer()
     out = make_rows(seen)
-    evaluate(shape.code, shape.theta, seen, False, out, q)
+    evaluate(shape.code, shape.theta, seen, False, out, q, np.inf)
     first = contact_row_count(seen)
     assert far.min() > 10.0
     assert np.all(out.weights[first : first + 3] * far <= 3.0 + 1e-9)
@@ -98,7 +98,7 @@ def test_a_face_is_held_where_it_is_met_and_moves_with_the_gel(name: str) -> Non
     theta = shape.theta.copy()
     theta[layout.GEL : layout.GEL + 3] = [0.4e-3, -0.3e-3, 0.6e-3]
     out = make_rows(seen)
-    evaluate(shape.code, theta, seen, False, out, q)
+    evaluate(shape.code, theta, seen, False, out, q, np.inf)
     rows, first = active_rows(seen, out.values), contact_row_count(seen)
     faces = (rows >= first) & (rows < first + len(seen.faces))
     assert faces.sum() == 3

@@ -33,7 +33,7 @@ from tests.support.shape_readings import missed, shape_readings
 
 
 def cost_of(shape: FamilyShape, seen: FamilyEvidence, robust: bool = True) -> float:
-    return float(evaluate(shape.code, shape.theta, seen, robust, make_rows(seen), prepared_buffer()))
+    return float(evaluate(shape.code, shape.theta, seen, robust, make_rows(seen), prepared_buffer(), np.inf))
 
 
 def prior_of(shape: FamilyShape) -> PriorRows:
@@ -48,12 +48,12 @@ def test_a_shape_that_costs_more_than_is_asked_for_is_left_and_no_other(name: st
     shape, evidence = made(name)
     seen, q, prior = observe(evidence), prepared_buffer(), prior_of(shape)
     tried = np.array([nudged(shape, 0.2, seed) for seed in range(6)])
-    costs = [total_cost(shape.code, one, seen, prior, False, make_rows(seen), q) for one in tried]
-    best, least = cheapest(shape.code, tried, seen, prior, make_rows(seen), q)
+    costs = [total_cost(shape.code, one, seen, prior, False, make_rows(seen), q, np.inf) for one in tried]
+    best, least = cheapest(shape.code, tried, seen, prior, False, make_rows(seen), q)
     assert (best, least) == (int(np.argmin(costs)), min(costs))
     for one in tried:
         whole, out = make_rows(seen), make_rows(seen)
-        cost = evaluate(shape.code, one, seen, False, whole, q)
+        cost = evaluate(shape.code, one, seen, False, whole, q, np.inf)
         assert evaluate(shape.code, one, seen, False, out, q, (1.0 + 1e-9) * cost) == cost
         assert np.array_equal(out.values, whole.values)
         for share in (0.0, 0.3, 0.9, 0.999):
@@ -110,10 +110,10 @@ def test_refining_never_costs_more_and_finds_the_way_back(name: str) -> None:
     seen, prior = observe(evidence), prior_of(shape)
     theta = nudged(shape, 0.15)
     basis = basis_of(shape.code, True, True)
-    before = total_cost(shape.code, theta, seen, prior, False, make_rows(seen), prepared_buffer())
+    before = total_cost(shape.code, theta, seen, prior, False, make_rows(seen), prepared_buffer(), np.inf)
     costs = [before]
     for rounds in (2, 12):
-        found, cost, curvature = minimize(shape.code, theta, seen, prior, basis, False, rounds)
+        found, cost, curvature = minimize(shape.code, theta, seen, prior, basis, False, rounds, True)
         costs.append(cost)
         assert np.isfinite(found).all()
         assert np.linalg.eigvalsh(curvature).min() >= -1e-6 * np.abs(curvature).max()
@@ -175,7 +175,7 @@ def test_a_thin_board_far_outside_of_the_mask_is_wrong_by_more_than_it_is_thick(
     board = draw_shape("board", np.random.default_rng(0))
     board.theta[revolution.SLOT.height], board.theta[layout.X] = np.log(0.06), 0.12
     out = make_rows(seen)
-    evaluate(board.code, board.theta, seen, False, out, prepared_buffer())
+    evaluate(board.code, board.theta, seen, False, out, prepared_buffer(), np.inf)
     passing = out.values[-len(seen.rays.kinds) :][seen.rays.kinds == PASS]
     met = passing[passing < 0.0]
     thick = np.exp(board.theta[revolution.SLOT.radii[0]])
