@@ -1,7 +1,7 @@
 """Rules of the language, and the counts of what breaks them, which may only fall.
 
-``counts.json`` holds, by rule, package and word, how many findings there may be. More is an error; when there are
-fewer, ``--update`` writes the lower count. It also holds the counts of ordinary words in names at commit bc239515.
+``counts.json`` holds, by rule, package and word, how many findings are allowed. More is an error; when there
+are fewer, ``--update`` writes the lower count.
 """
 
 import json
@@ -44,7 +44,9 @@ class Words:
 
     def __init__(self, folder: Path = HERE) -> None:
         self._words: Mapping[str, Any] = tomllib.loads((folder / "words.toml").read_text(encoding="utf-8"))
-        phrases: Mapping[str, str] = tomllib.loads((folder / "phrases.toml").read_text(encoding="utf-8"))["phrases"]
+        phrases: Mapping[str, str] = tomllib.loads((folder / "phrases.toml").read_text(encoding="utf-8"))[
+            "phrases"
+        ]
         self.phrases = [(re.compile(pattern, re.IGNORECASE), advice) for pattern, advice in phrases.items()]
         self.private: Mapping[str, str] = self._words["private"]
 
@@ -66,7 +68,7 @@ class Words:
         return word in lists["irregular"] or (word.endswith("ed") and len(word) > 3)
 
     def forbidden_start(self, docstring: str) -> str | None:
-        """Return the word with which a docstring may not begin: a unit, or the first of a phrase without a verb."""
+        """Return the first word of a docstring if none may begin with it; else None."""
         rest = re.sub(r"^(``[^`]*``,?\s*)+", "", docstring)
         first = re.split(r"[\s,:.;]", rest, maxsplit=1)[0]
         if first.lower() in self._words["starts"]["words"]:
@@ -100,13 +102,21 @@ def find_all(sources: Sources, words: Words) -> Iterator[Finding]:
         for text in texts:
             start = words.forbidden_start(text.text)
             if start:
-                yield Finding(f"start of a {kind}", start, text, "say what it does or is, then shape and unit")
+                yield Finding(f"start of a {kind}", start, text, "what it does or is, then shape and unit")
     for text in sources.functions:
         first = next(iter(split_name(text.text)), "")
         if words.is_participle(first):
             yield Finding("participle as a function's name", "participle", text, "begin with a verb")
         elif first not in words.verbs:
             yield Finding("function's name without a verb", "no verb", text, "begin with a verb")
+
+
+def function_shares(sources: Sources, words: Words) -> tuple[float, float]:
+    """Return the fractions of functions whose name begins with a verb, and with a participle."""
+    first = [next(iter(split_name(text.text)), "") for text in sources.functions]
+    participles = sum(words.is_participle(word) for word in first)
+    verbs = sum(word in words.verbs and not words.is_participle(word) for word in first)
+    return verbs / len(first), participles / len(first)
 
 
 def count(findings: Iterable[Finding]) -> Counts:
@@ -121,27 +131,24 @@ def count(findings: Iterable[Finding]) -> Counts:
 def excess(findings: Iterable[Finding], allowed: Counts) -> list[Finding]:
     """Return the findings of each rule, package and word that has more of them than allowed."""
     listed = list(findings)
-    return [
-        finding
-        for finding in listed
-        if _at(count(listed), finding) > _at(allowed, finding)
-    ]
+    now = count(listed)
+    return [finding for finding in listed if _number(now, finding) > _number(allowed, finding)]
 
 
-def _at(counts: Counts, finding: Finding) -> int:
+def lower(allowed: Counts, now: Counts) -> Counts:
+    """Return the allowed counts, each at most that of now, without those that are zero."""
+    result: Counts = {}
+    for rule, packages in allowed.items():
+        for package, words in packages.items():
+            for word, most in words.items():
+                number = min(most, now.get(rule, {}).get(package, {}).get(word, 0))
+                if number:
+                    result.setdefault(rule, {}).setdefault(package, {})[word] = number
+    return result
+
+
+def _number(counts: Counts, finding: Finding) -> int:
     return counts.get(finding.rule, {}).get(finding.text.package, {}).get(finding.word, 0)
-
-
-def lowered(allowed: Counts, now: Counts) -> Counts:
-    """Return the allowed counts, each at most that of now; what is no longer found is left out."""
-    return {
-        rule: {
-            package: {word: min(most, now[rule][package][word]) for word, most in sorted(words.items()) if now.get(rule, {}).get(package, {}).get(word)}
-            for package, words in sorted(packages.items())
-            if now.get(rule, {}).get(package)
-        }
-        for rule, packages in sorted(allowed.items())
-    }
 
 
 def load_counts() -> Counts:
@@ -154,6 +161,9 @@ def write_counts(counts: Counts) -> None:
     """Write the allowed counts, one package on a line."""
     rules = []
     for rule, packages in sorted(counts.items()):
-        rows = [f"  {json.dumps(package)}: {json.dumps(words, sort_keys=True)}" for package, words in sorted(packages.items())]
+        rows = [
+            f"  {json.dumps(package)}: {json.dumps(words, sort_keys=True)}"
+            for package, words in sorted(packages.items())
+        ]
         rules.append(f" {json.dumps(rule)}: {{\n" + ",\n".join(rows) + "\n }")
     COUNTS.write_text("{\n" + ",\n".join(rules) + "\n}\n", encoding="utf-8")

@@ -28,11 +28,13 @@ class Sources:
     """All texts of a checkout, by kind."""
 
     names: list[Text] = field(default_factory=list)
-    """Each identifier that a module defines, once per module: functions, classes, arguments, variables, fields."""
+    """Identifiers that a module defines, each once: functions, classes, arguments, variables, fields."""
     functions: list[Text] = field(default_factory=list)  #: names of functions; properties are not among them.
     docstrings: list[Text] = field(default_factory=list)  #: of modules, classes and functions.
     fields: list[Text] = field(default_factory=list)  #: documentation of constants and fields.
-    messages: list[Text] = field(default_factory=list)  #: strings with more than one word: messages, help, titles.
+    messages: list[Text] = field(
+        default_factory=list
+    )  #: strings with more than one word: messages, help, titles.
     pages: list[Text] = field(default_factory=list)  #: lines of pages, examples and shipped configuration.
 
 
@@ -113,12 +115,11 @@ def _defined(tree: ast.Module) -> Iterator[tuple[int, str]]:
 
 
 def _strings(tree: ast.Module, documentation: set[int]) -> Iterator[tuple[ast.expr, str]]:
-    inner = set[int]()
+    seen = set(documentation)
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
             parts = [part.value if isinstance(part, ast.Constant) else "{}" for part in node.values]
-            inner |= {id(part) for part in node.values}
+            seen |= {id(part) for part in node.values}
             yield node, "".join(str(part) for part in parts)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            if id(node) not in documentation and id(node) not in inner:
-                yield node, node.value
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in seen:
+            yield node, node.value
