@@ -75,6 +75,7 @@ hunt: $(DEV) ## the property tests on cases drawn anew
 lint: $(DEV)
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
+	@$(BIN)/python -m tests.docs.language
 
 types: $(DEV)
 	@$(BIN)/mypy --num-workers auto
