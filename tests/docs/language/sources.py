@@ -74,15 +74,15 @@ def _add_module(sources: Sources, source: str, path: str) -> None:
                 )
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and _is_named_freely(node):
             sources.functions.append(text(node.lineno, node.name))
-    for number, line in enumerate(source.splitlines(), 1):
-        comment = re.search(r"#: (.+)", line)
+    for number, content in enumerate(source.splitlines(), 1):
+        comment = re.search(r"#: (.+)", content)
         if comment:
             sources.fields.append(text(number, comment[1]))
     named = dict[str, int]()
     for line, name in _defined(tree):
         named.setdefault(name, line)
     named.setdefault(Path(path).stem, 1)
-    sources.names += [text(line, name) for name, line in named.items()]
+    sources.names += [text(first, name) for name, first in named.items()]
     for node, content in _strings(tree, documentation):
         if re.search(r"[A-Za-z]{2,}[^A-Za-z]* [^A-Za-z]*[a-z]{2,}", content):
             sources.messages.append(text(node.lineno, content))
