@@ -13,7 +13,7 @@ SOUND := pipewire wireplumber pipewire-alsa libportaudio2
 # Objects of ours and what each is made of.
 OBJECTS := mug:ceramic bowl:ceramic plate:ceramic pitcher:polycarbonate tray:wood wrench:steel
 
-.PHONY: help install demo demo-shape objectfiles test slow hunt lint types contracts data reference results bench tables sound clean
+.PHONY: help install demo demo-shape objectfiles test slow hunt lint types contracts docs data reference results bench tables sound clean
 
 help: ## what can be asked for
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -63,7 +63,7 @@ test slow hunt: export OPENBLAS_NUM_THREADS := 1
 
 test: ## everything CI checks
 	@$(MAKE) --no-print-directory --jobs $(DEV) sound
-	@$(MAKE) --no-print-directory --jobs lint types contracts
+	@$(MAKE) --no-print-directory --jobs lint types contracts docs
 	@$(BIN)/python -m pytest -m "not benchmark and not slow" -n auto --dist loadscope
 
 slow: $(DEV) ## what takes minutes and rarely breaks
@@ -82,6 +82,11 @@ types: $(DEV)
 
 contracts: $(DEV)
 	@$(BIN)/lint-imports
+
+# Any warning fails, and nothing is kept from an earlier build, whose warnings would not be repeated.
+docs: $(DEV) ## the documentation as a site with search, in build/site
+	@rm -rf build/site
+	@$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env -c docs/site -d build/doctrees . build/site
 
 data: $(DEV) ## the public data of the tests (75 MB, once), to TOUCHSTONE_DATA or the user's cache
 	@$(BIN)/python -m tests.support.fetch_data

@@ -135,7 +135,7 @@ class TaximPicture:
 
         Raises:
             CalibrationRefused: no published calibration, one without the untouched gel's shape, or one
-            of another camera.
+                of another camera.
         """
         pack = read_published(folder, PITCH)
         if pack.rest is None or pack.rest.shape != shape:
