@@ -14,7 +14,7 @@ from sphinx.util.docutils import SphinxDirective
 class _Docstring(GoogleDocstring):
     """A docstring whose ``Returns`` is a description; its type is the annotation."""
 
-    def _consume_returns_section(self, *_: object) -> list[tuple[str, str, list[str]]]:
+    def _consume_returns_section(self, **_: object) -> list[tuple[str, str, list[str]]]:
         return [("", "", self._dedent(self._consume_to_next_section()))]
 
 
