@@ -66,15 +66,21 @@ def front_for(experiment: AnyExperiment, scene: SceneFile, steps: int) -> Front:
     """Return the settings of this machine's curve, or of the one that came with the program, for a scene.
 
     Raises:
-        WrongUse: nothing like this run was measured.
+        WrongUse: nothing like this run was measured, or every setting in one run only.
         DataRefused: this machine's curve is damaged.
     """
     measured = measurement_of(experiment)
     like = measured.condition(scene)
     path = curve_path(experiment.name)
-    own = load(path) if path.exists() else None
+    measured_here = load(path) if path.exists() else None
+    own = None if measured_here is None else _points_with_spread(measured_here)
     shipped = None if own is not None and own.where(like) else measured.shipped_curve()
     curve = shipped or own
+    if curve is not None and not curve.points:
+        raise WrongUse(
+            f"each setting of this machine's cost curve has one run, and a budget needs two or more; measure "
+            f"more with `touchstone cost {experiment.name} --seeds 2`, or choose levels with --level"
+        )
     if curve is None:
         raise WrongUse(
             f"what accuracy costs was not measured on this machine; measure it with `touchstone cost "
@@ -83,6 +89,11 @@ def front_for(experiment: AnyExperiment, scene: SceneFile, steps: int) -> Front:
     reasons = stale(curve, machine(), code(measured.estimator))
     front = front_of(experiment, curve, {**like, experiment.plural: steps}, reasons, shipped is not None)
     return front.fitting(lambda setting: measured.explain_refusal(scene, setting))
+
+
+def _points_with_spread(curve: Curve) -> Curve:
+    """Drop the points with a single run: the spread of their seconds is unknown."""
+    return replace(curve, points=tuple(point for point in curve.points if len(point.samples) > 1))
 
 
 def front_at_hand(experiment: AnyExperiment, run: RunFiles) -> Front | None:

@@ -250,6 +250,20 @@ def test_without_a_curve_of_this_machine_the_one_that_came_along_is_gone_by_and_
     assert not curve_path(PROGRAM).exists()
 
 
+def test_settings_measured_in_one_run_give_no_bound_and_the_shipped_curve_is_used(
+    done: Recording, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    curve = curve_of(done)
+    single, full = replace(curve.points[0], samples=curve.points[0].samples[:1]), curve.points[1]
+    save(replace(curve, points=(single, full)), curve_path(PROGRAM))
+    assert [point.name for point in front_of_run(done).points] == [full.name]
+    save(replace(curve, points=(single,)), curve_path(PROGRAM))
+    assert front_of_run(done).shipped
+    monkeypatch.setattr(type(measurement_of(EXPERIMENT)), "shipped_curve", lambda _: None)
+    with pytest.raises(WrongUse, match=r"has one run.*--seeds 2"):
+        front_of_run(done)
+
+
 def test_a_curve_of_other_code_is_used_but_not_trusted(done: Recording, cache: Path) -> None:
     old = curve_of(done)
     save(Curve(PROGRAM, old.points, old.machine, {**old.code, "sha256": "0"}, old.made), curve_path(PROGRAM))
