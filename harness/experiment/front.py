@@ -73,7 +73,7 @@ def front_for(experiment: AnyExperiment, scene: SceneFile, steps: int) -> Front:
     like = measured.condition(scene)
     path = curve_path(experiment.name)
     measured_here = load(path) if path.exists() else None
-    own = None if measured_here is None else _points_with_spread(measured_here)
+    own = None if measured_here is None else _drop_single_runs(measured_here)
     shipped = None if own is not None and own.where(like) else measured.shipped_curve()
     curve = shipped or own
     if curve is not None and not curve.points:
@@ -91,7 +91,7 @@ def front_for(experiment: AnyExperiment, scene: SceneFile, steps: int) -> Front:
     return front.fitting(lambda setting: measured.explain_refusal(scene, setting))
 
 
-def _points_with_spread(curve: Curve) -> Curve:
+def _drop_single_runs(curve: Curve) -> Curve:
     """Drop the points with a single run: the spread of their seconds is unknown."""
     return replace(curve, points=tuple(point for point in curve.points if len(point.samples) > 1))
 

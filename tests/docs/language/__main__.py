@@ -47,8 +47,13 @@ def main() -> int:
             f"{100 * verbs:.1f} % begin with a verb, {100 * participles:.1f} % with a participle\n"
         )
         return 0
-    if shown:
-        sys.stdout.write("each is above the count that tests/docs/language/counts.json allows\n")
+    now = count(findings)
+    for rule, package, word in sorted({(f.rule, f.text.package, f.word) for f in shown}):
+        most = allowed.get(rule, {}).get(package, {}).get(word, 0)
+        sys.stdout.write(
+            f"{package}: {rule}: {word!r}: {now[rule][package][word]} found, {most} allowed by "
+            "tests/docs/language/counts.json; mend what you added, as listed above\n"
+        )
     return 1 if shown else 0
 
 
