@@ -256,6 +256,21 @@ def resolve_name(
     return nodes.reference("", "", content, refuri=outside) if outside else content
 
 
+def report_missing(_app: Sphinx, domain: Any, node: addnodes.pending_xref) -> bool:
+    """Warn of an unknown name, with the object whose docstring or signature contains it."""
+    if domain is None or domain.name != "py":
+        return False
+    place: nodes.Node | None = node
+    while place is not None and not isinstance(place, addnodes.desc | addnodes.desc_signature):
+        place = place.parent
+    signature = place[0] if isinstance(place, addnodes.desc) else place
+    where = signature["ids"][0] if signature is not None and signature["ids"] else node.get("refdoc")
+    _LOGGER.warning(
+        "%s: nothing is named %s", where, node["reftarget"], location=node.get("refdoc"), type="ref"
+    )
+    return True
+
+
 def write_views(app: Sphinx, exception: Exception | None) -> None:
     """Write the views of all files that a page leads to."""
     if exception is not None or app.builder.format != "html":
@@ -299,5 +314,6 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.add_transform(FileLinks)
     app.connect("doctree-read", add_source_links)
     app.connect("missing-reference", resolve_name)
+    app.connect("warn-missing-reference", report_missing)
     app.connect("build-finished", write_views)
     return {"parallel_read_safe": False}
