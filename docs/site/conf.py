@@ -69,6 +69,8 @@ nitpicky = True
 
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_fence_as_directive = {"math"}
+smartquotes = False  # "--spacing" is an option
+myst_disable_syntax = ["html_block", "html_inline"]
 myst_heading_anchors = 6
 
 napoleon_google_docstring = napoleon_numpy_docstring = False  # api_pages does it
