@@ -37,7 +37,7 @@ def markers(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="The artefact to write; <picture>_markers.json if left out.", metavar="FILE"),
+        typer.Option(help="The artefact to write; PICTURE_markers.json if left out.", metavar="FILE"),
     ] = None,
     report: Annotated[
         Path | None, typer.Option(help="Write a page with pictures into this folder.", metavar="DIR")

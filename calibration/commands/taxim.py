@@ -97,7 +97,7 @@ def taxim(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="The artefact to write; <folder>_calibration.npz, or fitted.npz in a run of the arm, if "
+            help="The artefact to write; FOLDER_calibration.npz, or fitted.npz in a run of the arm, if "
             "left out.",
             metavar="FILE",
         ),
