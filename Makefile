@@ -83,10 +83,12 @@ types: $(DEV)
 contracts: $(DEV)
 	@$(BIN)/lint-imports
 
-# Any warning fails, and nothing is kept from an earlier build, whose warnings would not be repeated.
+# Any warning fails. Pages that did not change are kept from a build that passed: others would not warn again.
 docs: $(DEV) ## the documentation as a site with search, in build/site
-	@rm -rf build/site
-	@$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env -c docs/site -d build/doctrees . build/site
+	@test -e build/doctrees/passed || rm -rf build/site build/doctrees
+	@rm -f build/doctrees/passed
+	@$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -c docs/site -d build/doctrees . build/site
+	@touch build/doctrees/passed
 
 data: $(DEV) ## the public data of the tests (75 MB, once), to TOUCHSTONE_DATA or the user's cache
 	@$(BIN)/python -m tests.support.fetch_data

@@ -1,9 +1,11 @@
 """The scripts under examples/ run as they stand, and say what the functions of ``harness.api`` return."""
 
+import json
 import os
 import re
 import subprocess
 import sys
+from collections.abc import Mapping
 from inspect import isfunction
 from pathlib import Path
 
@@ -49,16 +51,38 @@ HOMES = {"open_station": "harness.tasks.bench"}
 """Modules through which a command reaches a function that it does not name itself."""
 
 
-def run(name: str, *arguments: str) -> str:
-    done = subprocess.run(
-        [sys.executable, str(ROOT / "examples" / name), *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+PROGRAM = """
+import io, json, runpy, sys, traceback
+from contextlib import redirect_stdout
+results = {}
+for name, script, arguments in json.loads(sys.argv[1]):
+    sys.argv[1:], text = arguments, io.StringIO()
+    try:
+        with redirect_stdout(text):
+            runpy.run_path(script, run_name="__main__")
+        results[name] = [True, text.getvalue()]
+    except BaseException:
+        results[name] = [False, text.getvalue() + traceback.format_exc()]
+print(json.dumps(results))
+"""
+"""Runs each script as ``python SCRIPT ARGUMENTS`` does, all in one process: they import the same modules."""
+
+
+class Examples:
+    """Folder and printed text of the example scripts."""
+
+    def __init__(
+        self, folder: Path, results: Mapping[str, tuple[bool, str]], before: Mapping[Path, bytes]
+    ) -> None:
+        self.folder = folder
+        self.before = before  #: files of the recording before the scripts ran.
+        self._results = results
+
+    def printed(self, name: str) -> str:
+        """Return what a script printed; fail with its traceback if it raised."""
+        ended, text = self._results[name]
+        assert ended, text
+        return text
 
 
 @pytest.fixture(scope="module")
@@ -67,62 +91,95 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return in_process_run(tmp_path_factory.mktemp("recorded") / "run", touch_scene(contacts=2), seed=3).folder
 
 
+def files_of(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def examples(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Examples:
+    """All example scripts, run."""
+    folder = tmp_path_factory.mktemp("examples")
+    drawn, _ = drawn_set(18)
+    (folder / "presses").mkdir()
+    for index, image in enumerate(drawn.images):
+        write_png(folder / "presses" / f"{index:02d}.png", image)
+    write_png(folder / "presses" / "empty.png", drawn.background)
+    arguments = {
+        "answer_of_a_recording": [str(recorded)],
+        "calibration_of_a_gel": [str(folder / "presses")],
+        "image_of_a_press": [str(folder / "press.png")],
+        "instruments_of_a_bench": [str(folder / "gel.png")],
+        "modes_of_a_mesh": [],
+        "objectfile_of_a_mesh": [str(folder / "wrench")],
+        "picture_of_an_object": [str(folder / "mug.png"), "mug"],
+        "run_on_a_bench": [str(folder / "run")],
+        "sound_of_a_strike": [str(folder / "mug.wav"), "mug"],
+    }
+    assert list(arguments) == [path.stem for path in SCRIPTS]
+    before = files_of(recorded.parent)
+    scripts = [(path.stem, str(path), arguments[path.stem]) for path in SCRIPTS]
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, json.dumps(scripts)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert done.returncode == 0, done.stderr
+    return Examples(folder, json.loads(done.stdout.splitlines()[-1]), before)
+
+
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
 def test_a_script_has_at_most_15_lines(script: Path) -> None:
     assert len(script.read_text().splitlines()) <= 15
 
 
-def test_modes_of_a_mesh_are_listed_with_what_they_took() -> None:
-    lines = run("modes_of_a_mesh.py").splitlines()
+def test_modes_of_a_mesh_are_listed_with_what_they_took(examples: Examples) -> None:
+    lines = examples.printed("modes_of_a_mesh").splitlines()
     frequencies = [float(line.split()[0]) for line in lines[:6]]
     assert frequencies == sorted(frequencies)
     assert lines[-1].startswith("none is missing: True")
 
 
-def test_a_press_is_drawn_to_a_file_and_its_depth_is_read_again(tmp_path: Path) -> None:
-    said = run("image_of_a_press.py", str(tmp_path / "press.png"))
-    assert "(120, 160, 3)" in said
-    drawn, read = (float(text) for text in re.findall(r"([\d.]+) mm at the deepest", said))
-    assert read == pytest.approx(drawn, rel=0.2)
-    assert (tmp_path / "press.png").stat().st_size > 1000
+def test_a_press_is_rendered_to_a_file_and_its_depth_is_read_again(examples: Examples) -> None:
+    printed = examples.printed("image_of_a_press")
+    assert "(120, 160, 3)" in printed
+    rendered, read = (float(text) for text in re.findall(r"([\d.]+) mm at the deepest", printed))
+    assert read == pytest.approx(rendered, rel=0.2)
+    assert (examples.folder / "press.png").stat().st_size > 1000
 
 
-def test_a_strike_is_written_as_a_sound(tmp_path: Path) -> None:
-    said = run("sound_of_a_strike.py", str(tmp_path / "a.wav"), "mug")
-    assert "modes; the loudest" in said
-    assert (tmp_path / "a.wav").stat().st_size > 60_000
+def test_a_strike_is_written_as_a_sound(examples: Examples) -> None:
+    assert "modes; the loudest" in examples.printed("sound_of_a_strike")
+    assert (examples.folder / "mug.wav").stat().st_size > 60_000
 
 
-def test_an_object_is_drawn_by_its_networks(tmp_path: Path) -> None:
-    said = run("picture_of_an_object.py", str(tmp_path / "a.png"), "mug")
-    assert "160 x 120 pixels" in said
-    assert float(re.findall(r"SSIM ([\d.]+)", said)[0]) > 0.98
-    assert (tmp_path / "a.png").stat().st_size > 1000
+def test_an_object_is_rendered_by_its_networks(examples: Examples) -> None:
+    printed = examples.printed("picture_of_an_object")
+    assert "160 x 120 pixels" in printed
+    assert float(re.findall(r"SSIM ([\d.]+)", printed)[0]) > 0.98
+    assert (examples.folder / "mug.png").stat().st_size > 1000
 
 
-def test_a_run_is_made_replayed_and_compared(tmp_path: Path) -> None:
-    said = run("run_on_a_bench.py", str(tmp_path / "run"))
-    assert "touch against the " in said
-    assert Path(said.partition(": ")[0]).stat().st_size > 1000
-    assert (tmp_path / "run-replay" / "result.json").exists()
+def test_a_run_is_made_replayed_and_compared(examples: Examples) -> None:
+    printed = examples.printed("run_on_a_bench")
+    assert "touch against the " in printed
+    assert Path(printed.partition(": ")[0]).stat().st_size > 1000
+    assert (examples.folder / "run-replay" / "result.json").exists()
 
 
-def test_the_instruments_of_a_bench_are_checked(tmp_path: Path) -> None:
-    assert "gel: " in run("instruments_of_a_bench.py", str(tmp_path / "gel.png"))
-    assert (tmp_path / "gel.png").stat().st_size > 1000
+def test_the_instruments_of_a_bench_are_checked(examples: Examples) -> None:
+    assert "gel: " in examples.printed("instruments_of_a_bench")
+    assert (examples.folder / "gel.png").stat().st_size > 1000
 
 
-def test_an_objectfile_is_built_and_holds(tmp_path: Path) -> None:
-    assert "checks hold" in run("objectfile_of_a_mesh.py", str(tmp_path / "wrench"))
+def test_an_objectfile_is_built_and_verified(examples: Examples) -> None:
+    assert "checks hold" in examples.printed("objectfile_of_a_mesh")
 
 
-def test_a_gel_is_calibrated_by_pictures(tmp_path: Path) -> None:
-    drawn, _ = drawn_set(18)
-    for index, image in enumerate(drawn.images):
-        write_png(tmp_path / f"{index:02d}.png", image)
-    write_png(tmp_path / "empty.png", drawn.background)
-    assert "18 presses" in run("calibration_of_a_gel.py", str(tmp_path))
-    assert (tmp_path / "calibration.npz").exists()
+def test_a_gel_is_calibrated_from_images(examples: Examples) -> None:
+    assert "18 presses" in examples.printed("calibration_of_a_gel")
+    assert (examples.folder / "presses" / "calibration.npz").exists()
 
 
 def test_every_function_is_shown_in_an_example() -> None:
@@ -195,11 +252,10 @@ def test_importing_touchstone_imports_nothing_else() -> None:
     assert done.stdout.strip() == "set()"
 
 
-def test_a_recording_is_answered_and_nothing_is_written(recorded: Path) -> None:
-    before = {path: path.read_bytes() for path in recorded.parent.rglob("*") if path.is_file()}
-    assert run("answer_of_a_recording.py", str(recorded)).startswith("touch: (")
+def test_a_recording_is_answered_and_nothing_is_written(recorded: Path, examples: Examples) -> None:
+    assert examples.printed("answer_of_a_recording").startswith("touch: (")
     assert answer(recorded, ["localization.rounds=0"])["accuracy"]["localization.rounds"] == 0
-    assert {path: path.read_bytes() for path in recorded.parent.rglob("*") if path.is_file()} == before
+    assert files_of(recorded.parent) == examples.before
 
 
 def test_bad_input_is_named(tmp_path: Path) -> None:
