@@ -38,8 +38,9 @@ REBASED: dict[str, str] = {
     "table/*: rows: audio: *": _RECORDED,
     "table/*: rows: both: *": _RECORDED,
     "table/*: rows: paper's MFCC filter: *": _RECORDED,
+    "*.json: notes: None before, *": "CHANGELOG.md",
 }
-"""Patterns of places that may differ, such as ``object_vision.json: *``, with the decision record of each."""
+"""Patterns of places that may differ, such as ``object_vision.json: *``, with the page that declares it."""
 
 RUNS = {
     "mug": ("contact-localization", "--scene", "mug_both", "--seed", "11"),
