@@ -221,7 +221,7 @@ def obj_bytes_of(estimate: ShapeEstimate) -> bytes:
 
 def glb_bytes_of(estimate: ShapeEstimate) -> bytes:
     """Binary glTF 2.0, painted; metres, y up."""
-    import trimesh  # it imports networkx: a third of a second of each start of the program
+    import trimesh  # here, because importing it takes a third of a second
 
     colours = np.column_stack([colours_of(estimate.deviation), np.full(len(estimate.deviation), 255)])
     body = trimesh.Trimesh(

@@ -180,7 +180,7 @@ def probability_of_at_least(found: int, count: int, share: float) -> float:
     """Return the probability of ``found`` or more successes in ``count`` trials, each of ``share``."""
     if found == 0:
         return 1.0
-    from scipy.stats import binom  # half a second of each start of the program
+    from scipy.stats import binom  # here, because importing it takes half a second
 
     return float(binom.sf(found - 1, count, share))
 

@@ -108,7 +108,7 @@ def query_cost(model: ModelProto, name: str) -> GraphCost:
     return _skeleton_cost(_without_weights(model).SerializeToString(deterministic=True), name)
 
 
-# A process opens the same networks again and again, and their shapes are inferred at eleven sizes.
+# Cached: a process opens the same network repeatedly, and its shapes are inferred at eleven sizes.
 @lru_cache(maxsize=32)
 def _require_bounded_skeleton(data: bytes, name: str) -> None:
     skeleton = ModelProto.FromString(data)

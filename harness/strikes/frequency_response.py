@@ -354,7 +354,7 @@ def measure_blow(force: AnyArray, rate: float, level: float = 0.1) -> Blow:
     within = risen[begin:end]
     # ``_FINE`` points a sample; mirrored, so that the ends meet.
     mirrored = np.concatenate([within, within[::-1]])
-    # scipy.signal imports scipy.stats, half a second of each start of the program.
+    # Imported here, because it takes half a second and most commands do not need it.
     from scipy.signal import resample
 
     fine: FloatArray = resample(mirrored, len(mirrored) * _FINE)[: (len(within) - 1) * _FINE + 1]

@@ -108,7 +108,7 @@ def _bands(spectra: Spectra, settings: Analysis) -> list[tuple[int, int, int]]:
     open_bins = excited.sum(axis=0) >= 2
     level = np.where(open_bins, 10.0 * np.log10(np.maximum(power, 1e-300)), -3000.0)
     loudest = float(level.max())
-    # scipy.signal imports scipy.stats, half a second of each start of the program.
+    # Imported here, because it takes half a second and most commands do not need it.
     from scipy.signal import find_peaks
 
     tops, found = find_peaks(np.maximum(level, loudest - settings.range), prominence=min(settings.prominence))

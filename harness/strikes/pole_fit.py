@@ -264,7 +264,7 @@ def new_poles(
     channels, count = power.shape
     # The floor is itself an estimate: a median of n is worth a mean of n / 2.08.
     known = 2.0 * channels * reach / _MEDIAN_COSTS
-    # They are half a second of each start of the program.
+    # Imported here, because they take half a second and most commands do not need them.
     from scipy.signal import find_peaks
     from scipy.stats import f as f_distribution
 

@@ -51,7 +51,7 @@ class TouchFlags:
     missing_heights: int  #: number of pixels without a height.
     saturated_values: int  #: number of values clipped to black or white.
     out_of_domain_share: float | None  #: pixels steeper than any press of the calibration.
-    filled_bins_share: float | None  #: fraction of the pixels whose slope the calibration measured.
+    filled_bins_share: float | None  #: fraction of the sloped pixels whose table bin no press reached.
     shadow_out_of_table_share: float | None  #: fraction of the contact's rim; None without shadows.
 
 

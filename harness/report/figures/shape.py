@@ -108,7 +108,7 @@ def paint_surface(axes: Axes, shown: KnownSurface, view: FloatArray, scale: Norm
 
 def sections_figure(answer: Mesh, truth: Mesh | None) -> Figure:
     """Both surfaces cut by the two upright planes and the level one through the answer's middle."""
-    import trimesh  # it imports networkx: a third of a second of each start of the program
+    import trimesh  # here, because importing it takes a third of a second
 
     middle = answer.bounds.mean(axis=0)
     cuts = (("upright, along x", 1, (0, 2)), ("upright, along y", 0, (1, 2)), ("level", 2, (0, 1)))

@@ -220,7 +220,7 @@ def strike_figure(shown: ShownStrike) -> Figure:
 
 def colourable(mesh: Mesh) -> Mesh:
     """The same surface in triangles so small that a mode may be linear in each: a box has twelve."""
-    import trimesh  # it imports networkx: a third of a second of each start of the program
+    import trimesh  # here, because importing it takes a third of a second
 
     while _longest_edge(mesh) > _FINE * mesh.diagonal and 4 * len(mesh.faces) <= _MOST_FACES:
         finer = trimesh.remesh.subdivide(mesh.vertices, mesh.faces)  # type: ignore[no-untyped-call]
@@ -246,7 +246,7 @@ def spectrogram(sound: FloatArray, rate: float) -> tuple[FloatArray, FloatArray,
     window = 1 << max(int(np.round(np.log2(_WINDOW * rate))), 4)
     padded = np.pad(sound[:lasting], (0, max(window - lasting, 0)))
     hop = max(len(padded) // _FRAMES, window // 8, 1)
-    # scipy.signal imports scipy.stats, half a second of each start of the program.
+    # Imported here, because it takes half a second and most commands do not need it.
     from scipy.signal import stft
 
     frequencies, times, found = stft(padded, rate, "hann", window, window - min(hop, window - 1))

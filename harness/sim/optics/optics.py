@@ -186,7 +186,7 @@ def with_camera_noise(images: AnyArray, sigma: float, seed: int) -> FloatArray:
 
 
 def filled_share(surface: FloatArray, calibration: TactileCalibration) -> float | None:
-    """Share of the sloped pixels whose bin of the table no press reached, though others as steep did.
+    """Return the fraction of sloped pixels whose table bin no press reached, though others as steep did.
 
     Such bins hold what the fit's smooth model says (``calibration.taxim.table``). Pixels steeper than any
     press are another matter: they are drawn as the steepest, and ``TactileImages.extrapolated`` counts them.

@@ -122,7 +122,7 @@ def ring(
         kernels = np.real(amplitudes[:, heavy]) @ impulse_response(*heavy_modes) / rate
         if np.iscomplexobj(amplitudes):
             kernels += np.imag(amplitudes[:, heavy]) @ impulse_response(*heavy_modes, True) / rate
-        # scipy.signal imports scipy.stats, half a second of each start of the program.
+        # Imported here, because it takes half a second and most commands do not need it.
         from scipy.signal import oaconvolve
 
         sound += oaconvolve(force, kernels, axes=1)[:, : force.shape[1]]

@@ -87,7 +87,7 @@ def room_response(
 
 def reverberated(pressure: FloatArray, response: FloatArray) -> FloatArray:
     """``(k, t)`` Pa in the room, of ``(k, t)`` Pa in the open; what sounds on after the end is cut."""
-    # scipy.signal imports scipy.stats, half a second of each start of the program.
+    # Imported here, because it takes half a second and most commands do not need it.
     from scipy.signal import oaconvolve
 
     heard: FloatArray = oaconvolve(pressure, response[None], axes=1)[:, : pressure.shape[1]]
